@@ -1,0 +1,43 @@
+# make demo    the main job, with photographs that it renders itself
+# make test    the tests
+# make check   all that CI checks: format, lint, types, floors, tests
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: demo test quick check format lint types floors clean
+
+demo: $(VENV)/installed
+	$(BIN)/orthoscope demo -o demo
+
+test: $(VENV)/installed
+	$(BIN)/pytest -n auto
+
+quick: $(VENV)/installed
+	$(BIN)/pytest -n auto -m "not slow"
+
+check: lint types floors test
+
+lint: $(VENV)/installed
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+
+types: $(VENV)/installed
+	$(BIN)/pyright
+
+floors: $(VENV)/installed
+	$(BIN)/lint-imports
+
+format: $(VENV)/installed
+	$(BIN)/ruff format
+	$(BIN)/ruff check --fix
+
+$(VENV)/installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --upgrade "pip>=25.1"
+	$(BIN)/pip install --quiet --editable . --group dev
+	touch $@
+
+clean:
+	rm -rf $(VENV) demo

@@ -1,0 +1,90 @@
+"""Rotations and rigid motions: one `Pose` for users, stacks of matrices for the mathematics.
+
+Floor 0.  A rotation vector w is axis times angle; exp(w) its matrix (Rodrigues).  Steps are taken on the left,
+R <- exp(w) R, so that d(R p)/dw = -[R p]_x at w = 0.  After J. Sola et al., A micro Lie theory, arXiv:1812.01537.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
+
+__all__ = ["Pose", "nearest_rotation", "rotation_from_vector", "vector_from_rotation"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A rigid motion, named `a_from_b`: it takes points of frame b to frame a.
+
+    rotation: (3,3) orthonormal, determinant +1.  translation: (3,) metres.
+    Raises InputError where the rotation is not one (to 1e-6).
+    """
+
+    rotation: ndarray
+    translation: ndarray
+
+    def __post_init__(self) -> None:
+        rotation = frozen(self.rotation, (3, 3), "rotation")
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
+            raise InputError("rotation is not orthonormal with determinant +1; hand in a proper rotation matrix.")
+        object.__setattr__(self, "rotation", rotation)
+        object.__setattr__(self, "translation", frozen(self.translation, (3,), "translation"))
+
+    def __matmul__(self, other: Pose) -> Pose:
+        """a_from_c = a_from_b @ b_from_c."""
+        return Pose(self.rotation @ other.rotation, self.apply(other.translation[None])[0])
+
+    def inverse(self) -> Pose:
+        """b_from_a."""
+        return Pose(self.rotation.T, -self.rotation.T @ self.translation)
+
+    def apply(self, points: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
+        """Points (n,3) of frame b, metres, in frame a."""
+        return points @ self.rotation.T + self.translation
+
+
+def rotation_from_vector(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3 3"]:
+    """Rodrigues: rotation matrices of rotation vectors (radians)."""
+    angle = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
+    small = angle < 1e-4  # below it the series to third order is exact in double precision
+    safe = np.where(small, 1.0, angle)
+    sine = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
+    versine = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    cross = cross_matrix(vectors)
+    return np.eye(3) + sine * cross + versine * (cross @ cross)
+
+
+def vector_from_rotation(rotation: Float[ndarray, "3 3"]) -> Float[ndarray, "3"]:
+    """The rotation vector, length in [0, pi], of one rotation matrix; by way of the unit quaternion, stable at pi."""
+    w, axis = _quaternion(rotation)
+    sine = np.linalg.norm(axis)
+    return (2.0 if sine < 1e-12 else 2.0 * np.arctan2(sine, w) / sine) * axis
+
+
+def nearest_rotation(matrices: Float[ndarray, "*batch 3 3"]) -> Float[ndarray, "*batch 3 3"]:
+    """The rotation nearest to each matrix in the Frobenius norm (Kabsch)."""
+    left, _, right = np.linalg.svd(matrices)
+    left[..., :, 2] *= np.linalg.det(left @ right)[..., None]
+    return left @ right
+
+
+def cross_matrix(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3 3"]:
+    """[v]_x, so that [v]_x u = v x u."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors.shape[:-1], 3, 3)
+
+
+def _quaternion(rotation: Float[ndarray, "3 3"]) -> tuple[float, Float[ndarray, "3"]]:
+    """(w, axis) with w >= 0: the eigenvector of the largest eigenvalue of Bar-Itzhack's matrix."""
+    m = rotation
+    k = np.empty((4, 4))
+    k[:3, :3] = m + m.T - np.trace(m) * np.eye(3)
+    k[3, :3] = k[:3, 3] = [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]
+    k[3, 3] = np.trace(m)
+    q = np.linalg.eigh(k)[1][:, -1]
+    q = q if q[3] > 0 or (q[3] == 0 and q[np.flatnonzero(q)[0]] > 0) else -q
+    return float(q[3]), q[:3]
