@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -38,11 +39,11 @@ class Chart(ABC):
         """Unit rays of places."""
 
     @abstractmethod
-    def radius(self, theta):
+    def radius(self, theta: Any) -> Any:
         """s of an angle from the axis."""
 
     @abstractmethod
-    def angle(self, s):
+    def angle(self, s: Any) -> Any:
         """The angle from the axis of a radius."""
 
 
@@ -66,10 +67,10 @@ class _Gnomonic(Chart):
         inverse = 1.0 / np.sqrt(1.0 + x * x + y * y)
         return np.stack([x * inverse, y * inverse, inverse], axis=-1)
 
-    def radius(self, theta):
+    def radius(self, theta: Any) -> Any:
         return np.tan(theta)
 
-    def angle(self, s):
+    def angle(self, s: Any) -> Any:
         return np.arctan(s)
 
 
@@ -103,10 +104,10 @@ class _Equidistant(Chart):
         rays[theta >= np.pi] = np.nan
         return rays
 
-    def radius(self, theta):
+    def radius(self, theta: Any) -> Any:
         return theta
 
-    def angle(self, s):
+    def angle(self, s: Any) -> Any:
         return s
 
     @staticmethod
