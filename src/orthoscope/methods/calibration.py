@@ -5,7 +5,7 @@ Floor 3.  A calibration keeps its inputs, so that it can be recomputed, refitted
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,7 @@ from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Detections
 from orthoscope.models.camera import Camera
 
-__all__ = ["Calibration", "Uncertainty", "rms"]
+__all__ = ["Calibration", "Uncertainty", "residuals_of", "rms"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +69,22 @@ class Calibration:
             raise InputError(f"{len(self.camera_from_target)} poses for {len(self.detections.views)} views; expected one for each.")
 
     def residuals(self) -> tuple[Float[ndarray, "n 2"], ...]:
-        """Predicted minus detected, pixels, an array (n,2) for each view."""
-        points = self.detections.target.points
-        return tuple(
-            self.camera.project(pose.apply(points[view.ids])) - view.pixels
-            for pose, view in zip(self.camera_from_target, self.detections.views, strict=True)
-        )
+        """Predicted minus detected, pixels, an array (n,2) for each view; the formula's own value where its domain has ended."""
+        return residuals_of(self.camera, self.camera_from_target, self.detections)
 
     @property
     def rms_px(self) -> float:
         """Root mean square of |residual| over all corners, pixels (per point, as OpenCV's)."""
         return rms(np.concatenate(self.residuals()))
+
+
+def residuals_of(camera: Camera, camera_from_target: Sequence[Pose], detections: Detections) -> tuple[Float[ndarray, "n 2"], ...]:
+    """Predicted minus detected, pixels, an array (n,2) for each view, for a camera and one pose for each view."""
+    points = detections.target.points
+    return tuple(
+        camera.project(pose.apply(points[view.ids]), beyond=True) - view.pixels
+        for pose, view in zip(camera_from_target, detections.views, strict=True)
+    )
 
 
 def rms(residuals: Float[ndarray, "n 2"]) -> float:

@@ -1,0 +1,102 @@
+"""The judge: error on photographs that a calibration has not seen.
+
+Floor 3.  Views are dealt into folds; the method is called again without a fold; on the fold's views the lens is fixed and only the pose is
+fitted.  Folds come from numpy's default_rng(seed), so the same data give the same folds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+
+from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.geometry.pose import Pose
+from orthoscope.geometry.target import Detections
+from orthoscope.methods.calibration import Calibration, residuals_of
+from orthoscope.methods.resection import resect
+from orthoscope.models.camera import Camera
+
+__all__ = ["HeldOut", "held_out"]
+
+FEWEST_VIEWS = 4  # with fewer, a fold would leave a calibration that rests on assumptions
+
+Refit = Callable[[Detections], Calibration]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """For each view of the detections, in order: the camera that had not seen it (None where there is none), its pose there, residuals (n,2)."""
+
+    cameras: tuple[Camera | None, ...]
+    camera_from_target: tuple[Pose | None, ...]
+    residuals: tuple[Float[ndarray, "n 2"], ...]
+
+    @property
+    def rms_px(self) -> float:
+        """Root mean square of |residual| over all held-out corners, pixels per point; NaN where there are none."""
+        squares = np.concatenate([(e * e).sum(-1) for e in self.residuals])
+        return float(np.sqrt(squares[np.isfinite(squares)].mean())) if np.isfinite(squares).any() else float("nan")
+
+    @property
+    def standard_error_px(self) -> float:
+        """Standard error of `rms_px`, taking views as independent draws."""
+        sums = np.array([(e * e).sum() for e in self.residuals])
+        corners = np.array([len(e) for e in self.residuals])[np.isfinite(sums)]
+        sums = sums[np.isfinite(sums)]
+        views = len(sums)
+        if views < 2:
+            return float("nan")
+        mean = sums.sum() / corners.sum()
+        of_mean = np.sqrt(views / (views - 1) * ((sums - corners * mean) ** 2).sum()) / corners.sum()
+        return float(of_mean / (2.0 * np.sqrt(mean))) if mean > 0 else 0.0
+
+
+def folds_of_views(views: int, folds: int, *, seed: int = 0) -> list[ndarray]:
+    """Indices of the views of each fold: a permutation of default_rng(seed), cut into nearly equal parts."""
+    return [np.sort(part) for part in np.array_split(np.random.default_rng(seed).permutation(views), min(folds, views))]
+
+
+def held_out(
+    detections: Detections,
+    refit: Refit,
+    *,
+    folds: int = 5,
+    seed: int = 0,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> HeldOut:
+    """Held-out residuals of `refit` (a method with its settings) on these detections.
+
+    executor: where the folds run; by default here, one after the other.  progress: called with (folds done, folds).
+    A fold whose training views cannot tell the camera leaves its views without residuals (NaN); so do fewer than four views.
+    """
+    views = len(detections.views)
+    cameras: list[Camera | None] = [None] * views
+    poses: list[Pose | None] = [None] * views
+    residuals = [np.full((len(view.ids), 2), np.nan) for view in detections.views]
+    parts = folds_of_views(views, folds, seed=seed) if views >= FEWEST_VIEWS else []
+    run = executor.map if executor else map
+    fits = run(_fold, [detections] * len(parts), [refit] * len(parts), parts)
+    for done, (part, fit) in enumerate(zip(parts, fits, strict=True), 1):
+        if fit is not None:
+            camera, fitted, errors = fit
+            for i, pose, e in zip(part, fitted, errors, strict=True):
+                cameras[i], poses[i], residuals[i] = camera, pose, e
+        if progress:
+            progress(done, len(parts))
+    return HeldOut(tuple(cameras), tuple(poses), tuple(residuals))
+
+
+def _fold(detections: Detections, refit: Refit, part: Sequence[int]) -> tuple[Camera, tuple[Pose, ...], tuple[ndarray, ...]] | None:
+    """Camera from the other views, poses and residuals of these; None where the others cannot tell."""
+    others = np.setdiff1d(np.arange(len(detections.views)), part)
+    tested = detections.only(np.asarray(part))
+    try:
+        camera = refit(detections.only(others)).camera
+        poses = resect(camera, tested)
+    except CalibrationError:
+        return None
+    return camera, poses, residuals_of(camera, poses, tested)

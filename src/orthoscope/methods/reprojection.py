@@ -1,0 +1,192 @@
+"""The reprojection problem: how pixels move with the camera and with the pose of each view.
+
+Floor 3.  e = projected minus detected, of corner p in view j:  q = R_j p,  P = M (q + t_j),  (x, y) = chart(P),  (x_d, y_d) = lens(x, y),
+(u, v) = L (x_d, y_d, 1).  M is the identity and L = K but for a camera with a lens frame, where M = L^-1 K.  Derivatives run
+backwards from u and from v: a covector of the distorted plane through the lens's Jacobian, through the chart, to g = d/dP; then
+d/dt = M^T g and, for a rotation step on the left, d/dw = q x d/dt.  Each chunk of views becomes one stacked array
+(view, column, 2 n) whose Gram matrix holds all sums that the solver wants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Float, InputError, ndarray
+from orthoscope.geometry.pose import rotation_from_vector
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.methods.observations import Chunk, Observations, Poses
+from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.losses import Loss
+
+__all__ = ["Estimate", "Reprojection", "parameter_columns", "with_parameters"]
+
+INTRINSICS = ("fx", "fy", "cx", "cy", "skew")
+POSE = 6
+
+
+class Estimate(NamedTuple):
+    """The unknowns: a camera and the pose of each row of the observations."""
+
+    camera: Camera
+    poses: Poses
+
+
+class Reprojection:
+    """The problem for given observations, target points (m,3) and free parameters.
+
+    free: parameters of K and the lens that move; `fx=fy` ties two together; none of them leaves the camera fixed (resection).
+    Raises InputError for a parameter that the camera does not have.
+    """
+
+    def __init__(self, observations: Observations, points: Float[ndarray, "m 3"], camera: Camera, free: Sequence[str] = ()) -> None:
+        known = (*INTRINSICS, *camera.lens.names())
+        for name in (single for group in free for single in group.split("=")):
+            if name not in known:
+                raise InputError(f"the camera has no parameter {name!r}; it has {', '.join(known)}.")
+        self.free = tuple(free)
+        self._coefficients = _coefficients(free)
+        self._columns = [(i, single) for i, group in enumerate(free) for single in group.split("=")]
+        self._chunks = observations.chunks()
+        self._plane = [(points[chunk.ids, 0], points[chunk.ids, 1]) for chunk in self._chunks]
+        widest = max((chunk.u.size for chunk in self._chunks), default=0)
+        self._buffer = np.empty((len(free) + POSE + 1) * 2 * widest)
+        self._views = len(observations.order)
+
+    def linearise(self, unknowns: Estimate, loss: Loss) -> NormalEquations:
+        """The solver's sums at an estimate."""
+        k, m = len(self.free), self._views
+        A, a, B = np.zeros((k, k)), np.zeros(k), np.empty((m, k, POSE))
+        C, c, cost = np.empty((m, POSE, POSE)), np.empty((m, POSE)), 0.0
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            for chunk, plane in zip(self._chunks, self._plane, strict=True):
+                stacked = self._stack(unknowns, chunk, plane)
+                squared = _squared(stacked[:, -1], chunk)
+                cost += float(loss.cost(squared).sum())
+                if (weight := loss.weight(squared)) is not None:
+                    stacked *= np.sqrt(np.concatenate([weight, weight], axis=1))[:, None]
+                gram = stacked @ stacked.transpose(0, 2, 1)
+                A += gram[:, :k, :k].sum(0)
+                a += gram[:, :k, -1].sum(0)
+                B[chunk.rows], C[chunk.rows], c[chunk.rows] = gram[:, :k, k:-1], gram[:, k:-1, k:-1], gram[:, k:-1, -1]
+        return NormalEquations(cost, A, a, B, C, c)
+
+    def move(self, unknowns: Estimate, shared: Float[ndarray, " k"], views: Float[ndarray, "m 6"]) -> Estimate:
+        """The estimate after a step."""
+        camera, poses = unknowns
+        rotation = rotation_from_vector(views[:, :3]) @ poses.rotation
+        return Estimate(with_parameters(camera, self.free, shared), Poses(rotation, poses.translation + views[:, 3:]))
+
+    def residuals(self, estimate: Estimate) -> Float[ndarray, "m n 2"]:
+        """Projected minus detected of the whole table; NaN where the formula has no image; 0 in the padding."""
+        width = max(chunk.u.shape[1] for chunk in self._chunks)
+        out = np.zeros((self._views, width, 2))
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            for chunk, plane in zip(self._chunks, self._plane, strict=True):
+                row = self._stack(estimate, chunk, plane)[:, -1]
+                n = chunk.u.shape[1]
+                out[chunk.rows, :n, 0], out[chunk.rows, :n, 1] = row[:, :n], row[:, n:]
+        return out
+
+    def _stack(self, estimate: Estimate, chunk: Chunk, plane: tuple[ndarray, ndarray]) -> ndarray:
+        """(views, columns, 2 n): d/d shared, d/d pose, residual; first n of a row for u, the others for v."""
+        camera, poses = estimate
+        frame = camera.lens_frame or camera.intrinsics
+        turn = None if camera.lens_frame is None else np.linalg.solve(frame.matrix, camera.intrinsics.matrix)
+        rotation, translation = poses.rotation[chunk.rows, :, :, None], poses.translation[chunk.rows, :, None]
+        X, Y = plane
+        q = [rotation[:, i, 0] * X + rotation[:, i, 1] * Y for i in range(3)]
+        P = [q[i] + translation[:, i] for i in range(3)]
+        if turn is not None:
+            P = [turn[i, 0] * P[0] + turn[i, 1] * P[1] + turn[i, 2] * P[2] for i in range(3)]
+        x, y, pull_back = camera.lens.chart.linearise(*P)
+        at = camera.lens.linearise(x, y, self._coefficients)
+
+        views, n = chunk.u.shape
+        k = len(self.free)
+        stacked = self._buffer[: views * (k + POSE + 1) * 2 * n].reshape(views, k + POSE + 1, 2 * n)
+        stacked[:, :k] = 0.0
+        by_lens = dict(zip(self._coefficients, at.by, strict=True))
+        for i, name in self._columns:
+            _add_parameter(stacked[:, i, :n], stacked[:, i, n:], name, at.x, at.y, frame, by_lens)
+        halves = (
+            (slice(None, n), frame.fx * at.j_xx + frame.skew * at.j_yx, frame.fx * at.j_xy + frame.skew * at.j_yy),
+            (slice(n, None), frame.fy * at.j_yx, frame.fy * at.j_yy),
+        )
+        for half, along_x, along_y in halves:
+            _set_pose(stacked[:, k:-1, half], pull_back(along_x, along_y), q, turn)
+        stacked[:, -1, :n] = frame.fx * at.x + frame.skew * at.y + (frame.cx - chunk.u)
+        stacked[:, -1, n:] = frame.fy * at.y + (frame.cy - chunk.v)
+        if chunk.present is not None:
+            absent = np.concatenate([chunk.present, chunk.present], axis=1) == 0
+            np.copyto(stacked, 0.0, where=absent[:, None])
+        return stacked
+
+
+def with_parameters(camera: Camera, free: Sequence[str], step: Float[ndarray, " k"]) -> Camera:
+    """The camera after a step of its free parameters; a focal length never turns negative (it halves instead)."""
+    steps = {name: float(length) for group, length in zip(free, step, strict=True) for name in group.split("=")}
+    values = dict(zip(INTRINSICS, camera.intrinsics.as_tuple(), strict=True))
+    for name in INTRINSICS:
+        moved = values[name] + steps.pop(name, 0.0)
+        values[name] = 0.5 * values[name] if name in ("fx", "fy") and not moved > 0 else moved
+    moved_lens = {name: getattr(camera.lens, name) + length for name, length in steps.items()}
+    return replace(camera, intrinsics=Intrinsics(**values), lens=camera.lens.with_coefficients(**moved_lens))
+
+
+def parameter_columns(camera: Camera, x: ndarray, y: ndarray, free: Sequence[str]) -> tuple[Float[ndarray, "k 2 n"], Float[ndarray, "2 n"]]:
+    """d(u, v) by each free parameter at places (x, y) of the lens's chart, and (u, v) themselves."""
+    frame, wanted = camera.lens_frame or camera.intrinsics, _coefficients(free)
+    at = camera.lens.linearise(x, y, wanted)
+    by_lens = dict(zip(wanted, at.by, strict=True))
+    columns = np.zeros((len(free), 2, x.size))
+    for column, group in zip(columns, free, strict=True):
+        for name in group.split("="):
+            _add_parameter(column[0], column[1], name, at.x, at.y, frame, by_lens)
+    return columns, np.stack([frame.fx * at.x + frame.skew * at.y + frame.cx, frame.fy * at.y + frame.cy])
+
+
+def _coefficients(free: Sequence[str]) -> tuple[str, ...]:
+    """The names in `free` that are the lens's, each once."""
+    return tuple(dict.fromkeys(name for group in free for name in group.split("=") if name not in INTRINSICS))
+
+
+def _squared(residual: ndarray, chunk: Chunk) -> ndarray:
+    """|e|^2 of each corner of a chunk."""
+    n = chunk.u.shape[1]
+    return residual[:, :n] ** 2 + residual[:, n:] ** 2
+
+
+def _add_parameter(u: ndarray, v: ndarray, name: str, x_d: ndarray, y_d: ndarray, frame: Intrinsics, by_lens) -> None:
+    """Adds d(u, v) by one parameter to the two halves of a column."""
+    match name:
+        case "fx":
+            u += x_d
+        case "fy":
+            v += y_d
+        case "cx":
+            u += 1.0
+        case "cy":
+            v += 1.0
+        case "skew":
+            u += y_d
+        case _:
+            dx, dy = by_lens[name]
+            u += frame.fx * dx
+            if frame.skew:
+                u += frame.skew * dy
+            v += frame.fy * dy
+
+
+def _set_pose(columns: ndarray, g: tuple[ndarray, ndarray, ndarray], q: list[ndarray], turn: ndarray | None) -> None:
+    """Writes d/dw and d/dt into six columns (views, 6, n), from g = d/dP."""
+    if turn is not None:
+        g = tuple(turn[0, i] * g[0] + turn[1, i] * g[1] + turn[2, i] * g[2] for i in range(3))  # type: ignore[assignment]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        np.multiply(q[j], g[k], out=columns[:, i])
+        columns[:, i] -= q[k] * g[j]
+        columns[:, 3 + i] = g[i]

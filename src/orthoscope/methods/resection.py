@@ -1,0 +1,40 @@
+"""Where the target was in each view, the camera being known.
+
+Floor 3.  A homography to the camera's rays starts it, least squares in pixels ends it; nothing but the poses moves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orthoscope.geometry.arrays import CalibrationError
+from orthoscope.geometry.pose import Pose
+from orthoscope.geometry.target import Detections
+from orthoscope.methods.closed_form import poses_of_camera
+from orthoscope.methods.observations import Observations
+from orthoscope.methods.reprojection import Estimate, Reprojection
+from orthoscope.models.camera import Camera
+from orthoscope.solve.least_squares import Status, solve
+from orthoscope.solve.losses import Loss
+
+__all__ = ["resect"]
+
+
+def resect(camera: Camera, detections: Detections, *, loss: Loss | None = None) -> tuple[Pose, ...]:
+    """camera_from_target of each view, by least squares over its corners with the camera fixed.
+
+    Raises CalibrationError where a view has fewer than four corners inside the lens's domain.
+    """
+    observations = Observations.of(detections)
+    poses = poses_of_camera(camera, observations, detections.target.points)
+    lost = observations.order[~np.isfinite(poses.translation).all(1)]
+    if len(lost):
+        name = detections.views[int(lost.min())].image
+        raise CalibrationError(
+            f"view {name!r} has fewer than 4 corners where this camera sees anything. Leave it out, or use the right camera."
+        )
+    problem = Reprojection(observations, detections.target.points, camera)
+    solution = solve(problem, Estimate(camera, poses), loss=loss)
+    if solution.status is Status.NO_COST:
+        raise CalibrationError("the target lies behind this camera in some view. Use the camera that took the photographs.")
+    return observations.poses_in_order(solution.unknowns.poses)
