@@ -1,18 +1,23 @@
-"""Homographies from the target's plane to rays or pixels, for all views at once.
+"""The projective plane: homographies for all views at once, fitted lines, cross-ratios.
 
 Floor 0.  A plane point p = (X, Y, 1) is seen along ray r where r x (H p) = 0.  Stacked over the corners of a view, the
 normal matrix of these equations is  sum (|r|^2 I - r r^T) (x) (p p^T), 9 by 9; H is its last eigenvector.  Rays may lie past
 90 degrees.  Pixels are the rays (u, v, 1) after Hartley's normalisation (R. Hartley, In defense of the eight-point
 algorithm, TPAMI 19(6), 1997).  Views are padded to one length; weight 0 marks padding.
+
+What every projection keeps: points of a line stay on a line, and the cross-ratio of four of them (the paper's eq. 5 and 6) stays
+    CR = |p1 p3| |p2 p4| / (|p1 p4| |p2 p3|),   4/3 for four equally spaced points.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["homographies_to_pixels", "homographies_to_rays"]
+__all__ = ["FittedLines", "cross_ratio", "cross_ratio_slope", "fitted_lines", "homographies_to_pixels", "homographies_to_rays"]
 
 
 def homographies_to_rays(
@@ -43,6 +48,50 @@ def homographies_to_pixels(
     rays = np.concatenate([normalised, np.ones_like(normalised[..., :1])], axis=-1)
     h = np.linalg.solve(plane_from_pixels, homographies_to_rays(points, rays, weights))
     return h / np.sqrt((h * h).sum((1, 2), keepdims=True))
+
+
+class FittedLines(NamedTuple):
+    """The line nearest to each set of points: through `middle` along the unit vector `direction`.
+
+    along, across: place of each point on the line and its signed distance from it, to the side of (-direction_y, direction_x).  gap: the
+    difference of the two sums of squares; 0 where the points have no direction.
+    """
+
+    middle: Float[ndarray, "*batch 2"]
+    direction: Float[ndarray, "*batch 2"]
+    along: Float[ndarray, "*batch n"]
+    across: Float[ndarray, "*batch n"]
+    gap: Float[ndarray, "*batch"]
+
+
+def fitted_lines(points: Float[ndarray, "*batch n 2"], weights: Float[ndarray, "*batch n"]) -> FittedLines:
+    """The line with the least sum of squared distances from its points, for every set of the stack; weight 0 marks padding."""
+    middle = (weights[..., None] * points).sum(-2) / weights.sum(-1)[..., None]
+    x, y = np.moveaxis(points - middle[..., None, :], -1, 0)
+    more, mixed = (weights * (x * x - y * y)).sum(-1), 2.0 * (weights * x * y).sum(-1)
+    turn = 0.5 * np.arctan2(mixed, more)
+    cosine, sine = np.cos(turn), np.sin(turn)
+    along, across = x * cosine[..., None] + y * sine[..., None], y * cosine[..., None] - x * sine[..., None]
+    return FittedLines(middle, np.stack([cosine, sine], axis=-1), along, across, np.hypot(more, mixed))
+
+
+def cross_ratio(points: Float[ndarray, "*batch 4 2"]) -> Float[ndarray, "*batch"]:
+    """CR of four points in their order along a line."""
+    return _distance(points, 0, 2) * _distance(points, 1, 3) / (_distance(points, 0, 3) * _distance(points, 1, 2))
+
+
+def cross_ratio_slope(points: Float[ndarray, "*batch 4 2"]) -> Float[ndarray, "*batch 4 2"]:
+    """Derivative of `cross_ratio` by each coordinate; as a formula of distances it goes on where the points leave their line."""
+    slope = np.zeros_like(points)
+    for i, j, sign in ((0, 2, 1.0), (1, 3, 1.0), (0, 3, -1.0), (1, 2, -1.0)):
+        by_i = sign * (points[..., i, :] - points[..., j, :]) / _distance(points, i, j)[..., None] ** 2
+        slope[..., i, :] += by_i
+        slope[..., j, :] -= by_i
+    return cross_ratio(points)[..., None, None] * slope
+
+
+def _distance(points: Float[ndarray, "*batch 4 2"], i: int, j: int) -> Float[ndarray, "*batch"]:
+    return np.hypot(points[..., i, 0] - points[..., j, 0], points[..., i, 1] - points[..., j, 1])
 
 
 def _hartley(plane: Float[ndarray, "v n 2"], weights: Float[ndarray, "v n"]) -> tuple[Float[ndarray, "v n 2"], Float[ndarray, "v 3 3"]]:

@@ -8,16 +8,17 @@ takes the place of K at the end: the lens then acts about its own distortion cen
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.models.lens import Lens
 
-__all__ = ["Camera", "Intrinsics", "image_border"]
+__all__ = ["WIDEST", "Camera", "Intrinsics", "image_border"]
 
-ROWS = 64  # rows of an undistortion map that are made at once, so that the intermediate arrays stay in cache
+WIDEST = np.deg2rad(75.0)  # rays farther from the axis than this a pin-hole stretches without end
+BLOCK = 32768  # pixels of an undistortion map that are made at once, so that the intermediate arrays stay in cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,7 @@ class Camera:
 
     image_size: (width, height).  lens_frame: intrinsics of the lens's own plane where its distortion centre is not the principal
     point; None means the intrinsics themselves.
+    Raises InputError for an image without size.
     """
 
     image_size: tuple[int, int]
@@ -72,12 +74,21 @@ class Camera:
     lens: Lens
     lens_frame: Intrinsics | None = None
 
-    def project(self, points: Float[ndarray, "n 3"]) -> Float[ndarray, "n 2"]:
-        """Pixels (n,2) of points (n,3) in the camera frame, any unit; NaN where the lens gives them no image."""
+    def __post_init__(self) -> None:
+        width, height = (int(side) for side in self.image_size)
+        if width < 1 or height < 1:
+            raise InputError(f"image_size is {self.image_size}; expected (width, height) in pixels.")
+        object.__setattr__(self, "image_size", (width, height))
+
+    def project(self, points: Float[ndarray, "n 3"], *, beyond: bool = False) -> Float[ndarray, "n 2"]:
+        """Pixels (n,2) of points (n,3) in the camera frame, any unit; NaN where the lens gives them no image.
+
+        beyond: let the formula go on where the lens's domain has ended, as least squares does; such pixels are no images.
+        """
         if self.lens_frame is None:
-            return self.intrinsics.to_pixels(self.lens.distort(points))
+            return self.intrinsics.to_pixels(self.lens.distort(points, beyond=beyond))
         lens_from_camera = np.linalg.solve(self.lens_frame.matrix, self.intrinsics.matrix)
-        return self.lens_frame.to_pixels(self.lens.distort(points @ lens_from_camera.T))
+        return self.lens_frame.to_pixels(self.lens.distort(points @ lens_from_camera.T, beyond=beyond))
 
     def unproject(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Unit rays (n,3), camera frame, that fall on pixels (n,2); NaN where none does."""
@@ -87,6 +98,16 @@ class Camera:
             return rays
         rays = rays @ np.linalg.solve(self.intrinsics.matrix, self.lens_frame.matrix).T
         return rays / np.sqrt((rays * rays).sum(-1, keepdims=True))
+
+    def with_unit_scale(self) -> Camera:
+        """The same images, with the lens's own scale (if its formula has one) moved to K: fx, fy then are the scale at the centre."""
+        name = self.lens.scaled_by
+        if name is None or self.lens_frame is not None:
+            return self
+        scale = float(self.lens.gain(np.zeros(1))[0][0])
+        fx, fy, cx, cy, skew = self.intrinsics.as_tuple()
+        lens = self.lens.with_coefficients(**{name: getattr(self.lens, name) / scale})
+        return replace(self, intrinsics=Intrinsics(scale * fx, scale * fy, cx, cy, scale * skew), lens=lens)
 
     def undistort_pixels(self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None) -> Float[ndarray, "n 2"]:
         """Where a pin-hole camera (`straight`, default this camera's own K) would see what these pixels show; NaN where it cannot."""
@@ -109,15 +130,15 @@ class Camera:
         """
         straight, (width, height) = straight or self.intrinsics, size or self.image_size
         maps = np.empty((2, height, width), dtype=np.float32)
-        for rows in _row_blocks(height):
+        for rows in _row_blocks(width, height):
             y, x = np.mgrid[rows.start : rows.stop, 0:width].astype(float).reshape(2, -1)
-            source = self.distort_pixels(np.stack([x, y], axis=-1), straight)
-            outside = (source < -1.0).any(-1) | (source > np.array(self.image_size)).any(-1)
-            source[outside] = np.nan
-            maps[:, rows] = source.T.reshape(2, rows.stop - rows.start, width)
+            u, v = self.distort_pixels(np.stack([x, y], axis=-1), straight).T
+            u[(u < -1.0) | (u > self.image_size[0]) | (v < -1.0) | (v > self.image_size[1])] = np.nan
+            v[np.isnan(u)] = np.nan
+            maps[:, rows] = np.stack([u, v]).reshape(2, rows.stop - rows.start, width)
         return maps[0], maps[1]
 
-    def straight_intrinsics(self, keep: str = "all", widest: float = np.deg2rad(75.0)) -> Intrinsics:
+    def straight_intrinsics(self, keep: str = "all", widest: float = WIDEST) -> Intrinsics:
         """A pin-hole for the straight image, same size: `all` keeps every photographed pixel, `valid` only places that were photographed.
 
         widest: no ray farther than this from the axis (radians) is kept, since a pin-hole stretches it without end.
@@ -170,6 +191,7 @@ def _inner_rectangle(plane: ndarray, aspect: float) -> tuple[ndarray, ndarray]:
     return middle - reach, middle + reach
 
 
-def _row_blocks(height: int) -> Iterator[slice]:
-    for start in range(0, height, ROWS):
-        yield slice(start, min(start + ROWS, height))
+def _row_blocks(width: int, height: int) -> Iterator[slice]:
+    rows = max(1, BLOCK // width)
+    for start in range(0, height, rows):
+        yield slice(start, min(start + rows, height))

@@ -19,11 +19,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from orthoscope.geometry.arrays import ndarray
+from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.models.charts import EQUIDISTANT, GNOMONIC
 from orthoscope.models.lens import Lens, RadialLens, Warp
+from orthoscope.models.warp import invert
 
-__all__ = ["LENSES", "Brown", "Division", "Fet", "Fov", "KannalaBrandt", "Pfet", "Rational"]
+__all__ = ["LENSES", "Brown", "Division", "Fet", "Fov", "KannalaBrandt", "Pfet", "Rational", "lens_name", "parse_lens"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,14 +86,17 @@ class _Decentred(Lens):
         flat = Warp(x_d, y_d, j_xx, j_xy, j_yx, j_yy, by)
         return self._tilted(flat, wanted) if any(self.tilt) or "tau_x" in wanted or "tau_y" in wanted else flat
 
-    def unwarp_start(self, x_d, y_d):
-        if any(self.tilt):
-            x_d, y_d = _through(np.linalg.inv(self._tilt_matrix), x_d, y_d)
-        r_d = np.hypot(x_d, y_d)
-        s_table, r_table = self._table
-        ratio = np.interp(r_d, r_table, s_table) / np.where(r_d == 0, 1.0, r_d)  # past the end: starts at it, Newton says
-        ratio = np.where(np.isfinite(r_d), ratio, np.nan)
-        return x_d * ratio, y_d * ratio
+    def unwarp(self, x_d, y_d):
+        level = self._level
+        if level is not self:  # seen on a level sensor, the goal is nearer to the radial curve
+            m = np.linalg.inv(self._tilt_matrix)
+            in_front = m[2, 0] * x_d + m[2, 1] * y_d + m[2, 2] > 0  # past the horizon of the tilted plane nothing is seen
+            x_d, y_d = _through(m, np.where(in_front, x_d, np.nan), y_d)
+        r_d = np.sqrt(x_d * x_d + y_d * y_d)
+        s_table, r_table = level._table
+        ratio = np.interp(r_d, r_table, s_table) / np.maximum(r_d, 1e-300)  # past the end: starts at it, Newton says
+        ratio[level.beyond_image(x_d, y_d)] = np.nan
+        return invert(level.linearise, self.sees, (x_d * ratio, y_d * ratio), (x_d, y_d))
 
     def _by(self, name: str, x: ndarray, y: ndarray, u: ndarray, g: ndarray) -> tuple[ndarray, ndarray]:
         zero = np.zeros_like(x)
@@ -114,6 +118,11 @@ class _Decentred(Lens):
         slope = self.gain_by(name, u, g)
         assert slope is not None, name
         return x * slope, y * slope
+
+    @cached_property
+    def _level(self) -> _Decentred:
+        """The same lens with its sensor square to the axis."""
+        return self.with_coefficients(tau_x=0.0, tau_y=0.0) if any(self.tilt) else self
 
     @cached_property
     def _tilt_matrix(self) -> ndarray:
@@ -261,6 +270,8 @@ class Fet(RadialLens):
 
     chart = GNOMONIC
     free: ClassVar[tuple[str, ...]] = ("l",)
+    scaled_by = "scale"
+    starts = tuple({"scale": 1.0 / slope, "l": slope} for slope in (0.1, 0.5, 1.0, 2.0, 4.0))
 
     scale: float = 10.0
     l: float = 0.1  # noqa: E741  the formula's own letter
@@ -282,6 +293,7 @@ class Fov(RadialLens):
 
     chart = GNOMONIC
     free: ClassVar[tuple[str, ...]] = ("w",)
+    starts = ({"w": 0.3}, {"w": 0.9}, {"w": 1.5})  # at w = 0 the slope by w is 0: no fit would leave it
 
     w: float = 0.0
 
@@ -311,6 +323,7 @@ class Division(RadialLens):
 
     chart = GNOMONIC
     free: ClassVar[tuple[str, ...]] = ("l",)
+    starts = ({}, {"l": -0.3}, {"l": -1.0})
 
     l: float = 0.0  # noqa: E741  the formula's own letter
 
@@ -402,3 +415,24 @@ def _atan_ratio_slope(z: ndarray) -> ndarray:
     series = -1 / 3 + z * (2 / 5 - z * (3 / 7 - z * (4 / 9 - z * (5 / 11 - z * (6 / 13 - z * 7 / 15)))))
     safe = np.where(small, 1.0, z)
     return np.where(small, series, 0.5 * (1.0 / (safe * (1.0 + safe)) - np.arctan(np.sqrt(safe)) / safe**1.5))
+
+
+def parse_lens(text: str) -> tuple[type[Lens], tuple[str, ...]]:
+    """The lens of a description such as `brown` or `brown:k1,k2`, and the coefficients that a calibration is to free.
+
+    Raises InputError for a lens or a coefficient that is not there.
+    """
+    name, _, listed = text.strip().partition(":")
+    if name not in LENSES:
+        raise InputError(f"lens {name!r} is not known; expected one of {', '.join(LENSES)}, as in --lens brown or --lens brown:k1,k2.")
+    lens = LENSES[name]
+    free = tuple(part.strip() for part in listed.split(",") if part.strip()) if listed else lens.free
+    for coefficient in free:
+        if coefficient not in lens.names():
+            raise InputError(f"lens {name!r} has no coefficient {coefficient!r}; it has {', '.join(lens.names())}.")
+    return lens, free
+
+
+def lens_name(lens: Lens) -> str:
+    """The name of a lens in LENSES."""
+    return next(name for name, kind in LENSES.items() if type(lens) is kind)
