@@ -13,12 +13,16 @@ from functools import partial
 import numpy as np
 
 from orthoscope.evaluate.metrics import corners_by_cell, lateral_errors, normalised_calibration_error
-from orthoscope.geometry.arrays import ndarray
+from orthoscope.geometry.arrays import InputError, ndarray
+from orthoscope.geometry.target import Detections
 from orthoscope.methods import METHODS
-from orthoscope.methods.calibration import Calibration, rms
+from orthoscope.methods.calibration import Calibration, residuals_of, rms
 from orthoscope.methods.held_out import HeldOut, held_out
+from orthoscope.methods.resection import resect
+from orthoscope.methods.screening import screened
+from orthoscope.models.camera import Camera
 
-__all__ = ["Evaluation", "ViewError", "evaluate"]
+__all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on"]
 
 SUSPECT = 2.5  # times the typical view's rms: a view with more does not belong
 NOTABLE = 0.3  # px: but not where it is small in itself
@@ -59,6 +63,32 @@ class Evaluation:
     suspects: tuple[tuple[str, str], ...]
     warnings: tuple[str, ...]
     verdict: str
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenError:
+    """Error of a camera on photographs it was not made from: rms_px per point, of each view too; nce; the detections that could be used."""
+
+    detections: Detections
+    rms_px: float
+    view_rms_px: tuple[float, ...]
+    nce: float
+
+
+def evaluate_on(camera: Camera, detections: Detections) -> UnseenError:
+    """The error of a camera on other photographs: the camera stays fixed, the pose of each view is fitted.
+
+    Raises InputError where the photographs are of another size than the camera's, CalibrationError where no view can be used.
+    """
+    if tuple(detections.image_size) != tuple(camera.image_size):
+        (width, height), (w, h) = detections.image_size, camera.image_size
+        raise InputError(f"these photographs are {width}x{height}; the camera was calibrated at {w}x{h}. Hand in photographs of that size.")
+    used = screened(detections)
+    poses = resect(camera, used)
+    residuals = residuals_of(camera, poses, used)
+    estimated, observed = lateral_errors(camera, poses, used)
+    nce = normalised_calibration_error(estimated, observed, camera.intrinsics) if len(observed) else float("nan")
+    return UnseenError(used, rms(np.concatenate(residuals)), tuple(rms(e) for e in residuals), nce)
 
 
 def evaluate(

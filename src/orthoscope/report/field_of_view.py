@@ -1,0 +1,53 @@
+"""How much of the world fits on the photograph, as angles.
+
+Floor 6.  A row of pixels sweeps a fan of rays; its opening is the sum of the angles between neighbours, so it may pass 180 degrees, and
+parts of the row without rays (beyond a lens's domain) add nothing.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.models.camera import Camera
+
+__all__ = ["FieldOfView", "field_of_view"]
+
+STEPS = 512
+
+
+class FieldOfView(NamedTuple):
+    """Angles, radians; NaN where no ray falls on the line of pixels."""
+
+    horizontal: float
+    vertical: float
+    diagonal: float
+
+
+def field_of_view(camera: Camera) -> FieldOfView:
+    """Angles between the outer edges of the frame: along the row and the column of the principal point, and between opposite corners.
+
+    The diagonal is the larger of the two.
+    """
+    width, height = camera.image_size
+    left, top, right, bottom = -0.5, -0.5, width - 0.5, height - 0.5
+    x, y = (
+        float(np.clip(at, 0.0, side - 1.0))
+        for at, side in zip((camera.intrinsics.cx, camera.intrinsics.cy), camera.image_size, strict=True)
+    )
+    diagonals = _swept(camera, (left, top), (right, bottom)), _swept(camera, (left, bottom), (right, top))
+    return FieldOfView(_swept(camera, (left, y), (right, y)), _swept(camera, (x, top), (x, bottom)), max(diagonals))
+
+
+def _swept(camera: Camera, start: tuple[float, float], end: tuple[float, float]) -> float:
+    """The angle that the rays sweep from one pixel to another, radians."""
+    rays = camera.unproject(np.linspace(start, end, STEPS + 1))
+    steps = _angles(rays[:-1], rays[1:])
+    return float(np.nansum(steps)) if np.isfinite(steps).any() else float("nan")
+
+
+def _angles(a: Float[ndarray, "n 3"], b: Float[ndarray, "n 3"]) -> Float[ndarray, " n"]:
+    """Angles between unit vectors, exact for small ones too (W. Kahan)."""
+    return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))

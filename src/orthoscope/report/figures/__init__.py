@@ -1,0 +1,23 @@
+"""The report's figures: data in, Figure out.
+
+Floor 6.  The only place with matplotlib; importing this package loads it, so import it where a figure is needed.
+"""
+
+from orthoscope.report.figures.coverage import coverage
+from orthoscope.report.figures.lens import displacement_map, distortion_curve
+from orthoscope.report.figures.photograph import photograph_uri
+from orthoscope.report.figures.residuals import residual_vectors, residuals_by_place, residuals_by_view
+from orthoscope.report.figures.scene import board_poses
+from orthoscope.report.figures.style import to_svg
+
+__all__ = [
+    "board_poses",
+    "coverage",
+    "displacement_map",
+    "distortion_curve",
+    "photograph_uri",
+    "residual_vectors",
+    "residuals_by_place",
+    "residuals_by_view",
+    "to_svg",
+]

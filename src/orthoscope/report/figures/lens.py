@@ -1,0 +1,182 @@
+"""What the lens does: its curve from the axis outwards, and how far it moves each place of the frame.
+
+Floor 6.  The ideal image of a ray is its place in the lens's own chart through K: a pin-hole's image for lenses of the plane, an
+equidistant one (r = f theta) for lenses of the angle.  Displacement is image minus ideal, pixels; negative along the radius is
+barrel, positive is pincushion.  Both figures come from `project` and `unproject` alone, so any lens can be shown.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.methods.calibration import Calibration
+from orthoscope.models.camera import Camera, image_border
+from orthoscope.models.charts import GNOMONIC
+from orthoscope.report.figures.style import BLUE, EMPTY, GREY, INK, ORANGE, RED, WIDTH, frame_figure, note, styled
+
+__all__ = ["displacement_map", "distortion_curve"]
+
+DIRECTIONS = 48  # around the axis
+BEYOND = 1.12  # the curve is drawn this much farther than the frame's farthest corner
+
+
+@styled
+def distortion_curve(calibration: Calibration) -> Figure:
+    """Distance from the principal point and radial displacement (px) against the angle from the axis (degrees).
+
+    Bands span all directions around the axis.  Marked: the farthest corner that was seen, the frame's farthest pixel, the lens's end.
+    """
+    camera = calibration.camera
+    figure = Figure(figsize=(WIDTH, 4.9))
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.25, 1.0))
+    above.set_ylabel("distance from principal point (px)")
+    below.set(xlabel="angle from the optical axis (°)", ylabel="radial displacement (px)")
+    edge = _largest_angle(camera.unproject(_outline(camera)))
+    if not np.isfinite(edge):
+        note(above, "no pixel of the frame's border or inside has a ray")
+        return figure
+    angles = np.linspace(0.0, min(BEYOND * edge, camera.lens.chart.reach - 1e-3), 240)
+    radius, displacement = _along_angles(camera, angles)
+    _band(above, angles, radius, "this lens")
+    _ideals(above, camera, angles, float(np.nanmax(radius)))
+    _band(below, angles, displacement, "")
+    below.axhline(0.0, color=GREY, lw=0.9, ls=(0, (4, 3)))
+    for axes in (above, below):
+        axes.grid()
+        _marks(axes, calibration, angles[-1], edge)
+    above.set(xlim=(0.0, np.rad2deg(angles[-1])), ylim=(0.0, 1.25 * float(np.nanmax(radius))))
+    figure.legend(*above.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.8, columnspacing=1.2)
+    return figure
+
+
+@styled
+def displacement_map(calibration: Calibration) -> Figure:
+    """How far, and whereto, the lens moves each place of the frame from its ideal image (px); grey where no ray falls."""
+    camera = calibration.camera
+    figure, axes = frame_figure(camera.image_size)
+    axes.set_facecolor(EMPTY)
+    x, y, moved = _moved(camera, 240)
+    size = np.hypot(moved[..., 0], moved[..., 1])
+    if not np.isfinite(size).any():
+        note(axes, "no pixel of the frame has a ray")
+        return figure
+    shown = axes.pcolormesh(x, y, np.ma.masked_invalid(size), cmap="cividis", vmin=0.0, shading="nearest", rasterized=True)
+    ideal = "pin-hole" if camera.lens.chart is GNOMONIC else "equidistant"
+    figure.colorbar(shown, ax=axes, label=f"displacement from the {ideal} image (px)", pad=0.02, shrink=0.9, aspect=32)
+    if np.nanmax(size) > 1e-9:
+        _contours(axes, camera)
+        _arrows(axes, camera)
+    axes.plot(camera.intrinsics.cx, camera.intrinsics.cy, "+", color=ORANGE, ms=10, mew=1.6, label="principal point")
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.2)
+    return figure
+
+
+def _ideal(camera: Camera, rays: Float[ndarray, "n 3"]) -> Float[ndarray, "n 2"]:
+    """Pixels (n,2) that the chart alone gives rays (n,3)."""
+    return camera.intrinsics.to_pixels(np.stack(camera.lens.chart.flatten(*rays.T), axis=-1))
+
+
+def _along_angles(camera: Camera, angles: Float[ndarray, " a"]) -> tuple[Float[ndarray, "a d"], Float[ndarray, "a d"]]:
+    """For each angle and direction: distance of the image from the principal point, and how much of it the lens added."""
+    phi = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    rays = np.stack(
+        np.broadcast_arrays(np.sin(angles[:, None]) * np.cos(phi), np.sin(angles[:, None]) * np.sin(phi), np.cos(angles[:, None])), axis=-1
+    ).reshape(-1, 3)
+    centre = np.array([camera.intrinsics.cx, camera.intrinsics.cy])
+    image, ideal = camera.project(rays) - centre, _ideal(camera, rays) - centre
+    outwards = ideal / np.maximum(np.hypot(*ideal.T), 1e-12)[:, None]
+    radius, added = np.hypot(*image.T), ((image - ideal) * outwards).sum(-1)
+    return radius.reshape(len(angles), -1), added.reshape(len(angles), -1)
+
+
+def _band(axes: Axes, angles: ndarray, values: Float[ndarray, "a d"], label: str) -> None:
+    """The mean over the directions as a line inside the band of all of them, as far as every direction has an image."""
+    whole = np.isfinite(values).all(-1)
+    degrees, values = np.rad2deg(angles[whole]), values[whole]
+    axes.fill_between(degrees, values.min(-1), values.max(-1), color=BLUE, alpha=0.22, linewidth=0, label=None)
+    axes.plot(degrees, values.mean(-1), color=BLUE, lw=1.7, label=label)
+
+
+def _ideals(axes: Axes, camera: Camera, angles: ndarray, top: float) -> None:
+    """The pin-hole's and the equidistant lens's curves for the same focal length."""
+    focal = float(np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy))
+    front = angles < np.pi / 2 - 1e-3
+    pin_hole = focal * np.tan(angles[front])
+    shown = pin_hole < 2 * top
+    axes.plot(np.rad2deg(angles[front][shown]), pin_hole[shown], color=GREY, lw=1.0, ls=(0, (4, 3)), label="pin-hole, f tan θ")
+    axes.plot(np.rad2deg(angles), focal * angles, color=GREY, lw=1.0, ls=(0, (1, 2)), label="equidistant, f θ")
+
+
+def _marks(axes: Axes, calibration: Calibration, last: float, edge: float) -> None:
+    """Vertical lines: how far corners were seen, where the frame ends, where the lens ends."""
+    camera = calibration.camera
+    pixels = [view.pixels for view in calibration.detections.views if len(view.pixels)]
+    seen = _largest_angle(camera.unproject(np.concatenate(pixels))) if pixels else np.nan
+    whole = bool(np.isfinite(camera.unproject(image_border(camera.image_size))).all())
+    marks = [
+        (seen, ORANGE, "farthest corner seen"),
+        (edge, INK, "image corner" if whole else "last pixel with a ray"),
+        (camera.lens.field_angle, RED, "end of the lens's domain"),
+    ]
+    for angle, colour, words in marks:
+        if np.isfinite(angle) and angle <= last:
+            axes.axvline(np.rad2deg(angle), color=colour, lw=1.1, label=f"{words}, {np.rad2deg(angle):.1f}°")
+    if np.isfinite(seen):
+        axes.axvspan(np.rad2deg(seen), np.rad2deg(last), color=ORANGE, alpha=0.09, linewidth=0)
+
+
+def _contours(axes: Axes, camera: Camera) -> None:
+    """Lines of equal displacement, labelled in pixels."""
+    x, y, moved = _moved(camera, 80)
+    size = np.ma.masked_invalid(np.hypot(moved[..., 0], moved[..., 1]))
+    lines = axes.contour(x, y, size, levels=7, colors="white", linewidths=0.7, alpha=0.9)
+    axes.clabel(lines, fmt="%g px", fontsize=7)
+
+
+def _arrows(axes: Axes, camera: Camera) -> None:
+    """Directions on a coarse grid, the longest as long as a step of the grid; the contours say how far."""
+    x, y, moved = _moved(camera, 13)
+    longest = float(np.nanmax(np.hypot(moved[..., 0], moved[..., 1]), initial=0.0))
+    if longest > 0:
+        axes.quiver(
+            x,
+            y,
+            *np.moveaxis(moved, -1, 0),
+            angles="xy",
+            scale_units="xy",
+            scale=longest / (x[1] - x[0]),
+            pivot="mid",
+            color="white",
+            alpha=0.75,
+            width=0.003,
+        )
+
+
+def _moved(camera: Camera, samples: int) -> tuple[ndarray, ndarray, ndarray]:
+    """x and y of a grid over the frame, pixels, and at each place image minus ideal (rows, columns, 2); NaN where there is no ray.
+
+    samples: along the frame's longer side.
+    """
+    width, height = camera.image_size
+    columns, rows = (max(2, round(samples * side / max(width, height))) for side in camera.image_size)
+    x = (np.arange(columns) + 0.5) / columns * width - 0.5
+    y = (np.arange(rows) + 0.5) / rows * height - 0.5
+    pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return x, y, (pixels - _ideal(camera, camera.unproject(pixels))).reshape(rows, columns, 2)
+
+
+def _outline(camera: Camera) -> Float[ndarray, "n 2"]:
+    """Pixels of the frame's border and of a coarse grid inside, which still has rays where an image circle lies within the frame."""
+    width, height = camera.image_size
+    inside = np.stack(np.meshgrid(np.linspace(0, width - 1, 65), np.linspace(0, height - 1, 65)), axis=-1).reshape(-1, 2)
+    return np.concatenate([image_border(camera.image_size), inside])
+
+
+def _largest_angle(rays: Float[ndarray, "n 3"]) -> float:
+    """The largest angle from the axis (radians) among rays that are there; NaN without any."""
+    angles = np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2])
+    angles = angles[np.isfinite(angles)]
+    return float(angles.max()) if len(angles) else float("nan")

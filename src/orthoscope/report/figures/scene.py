@@ -1,0 +1,92 @@
+"""Where the boards were: the camera with its frustum and every board, in three dimensions.
+
+Floor 6.  Drawn as a photographer stands: the camera's x to the right, z (forward) into the page, y (down) downwards.  Matplotlib's axes
+are (right, into the page, up), hence (x, z, -y).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+
+from orthoscope.evaluate.evaluation import Evaluation
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.target import Target
+from orthoscope.methods.calibration import Calibration
+from orthoscope.models.camera import Camera
+from orthoscope.report.figures.style import BLUE, INK, ORANGE, RED, WIDTH, styled
+
+__all__ = ["board_poses"]
+
+NUMBERED = 30  # boards; with more of them numbers would only hide each other
+WIDEST = np.deg2rad(55.0)  # half the opening of the drawn frustum; a fisheye's has no flat front
+
+
+@styled
+def board_poses(evaluation: Evaluation) -> Figure:
+    """The boards as the camera saw them, metres, numbered as in the table of photographs; suspects stand out."""
+    calibration = evaluation.calibration
+    figure = Figure(figsize=(WIDTH, 4.7))
+    figure.set_layout_engine("none")  # matplotlib's layouts do not know how far 3-D labels reach
+    axes = figure.add_axes((0.02, 0.07, 0.9, 0.91), projection="3d", computed_zorder=False)
+    assert isinstance(axes, Axes3D)
+    boards = _as_drawn(_boards(calibration))
+    suspects = {name for name, _ in evaluation.suspects}
+    odd = [view.image in suspects for view in calibration.detections.views]
+    frustum = _as_drawn(_frustum(calibration.camera, boards))
+    axes.add_collection3d(Line3DCollection(frustum, colors=INK, linewidths=1.1))
+    faces = [RED if is_odd else BLUE for is_odd in odd]
+    if len(boards):
+        axes.add_collection3d(
+            Poly3DCollection(boards, facecolors=faces, edgecolors=faces, alpha=float(np.clip(4 / len(boards), 0.05, 0.28)), linewidths=0.9)
+        )
+        axes.plot(*boards[:, 0].T, "o", ms=2.6, color=ORANGE, label="corner 0")
+        axes.legend(loc="upper left", borderaxespad=0.0)
+    for i, board in enumerate(boards):
+        if odd[i] or len(boards) <= NUMBERED:
+            x, y, z = board.mean(0)
+            axes.text(x, y, z, str(i + 1), color=RED if odd[i] else INK, fontsize=7, ha="center", va="center")
+    _frame_scene(axes, np.concatenate([boards.reshape(-1, 3), frustum.reshape(-1, 3)]))
+    return figure
+
+
+def _frame_scene(axes: Axes3D, points: Float[ndarray, "n 3"]) -> None:
+    """One scale on all three axes, names and units as the camera's."""
+    low, high = points.min(0), points.max(0)
+    margin = 0.03 * float((high - low).max())
+    axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), zlim=(low[2] - margin, high[2] + margin))
+    axes.set_box_aspect(high - low + 2 * margin)
+    axes.set(xlabel="x, right (m)", ylabel="z, forward (m)", zlabel="y, down (m)")
+    axes.zaxis.set_major_formatter(lambda value, _: f"{-value + 0.0:.4g}".replace("-", "\N{MINUS SIGN}"))
+    axes.view_init(elev=22, azim=-62)
+    axes.locator_params(nbins=5)
+
+
+def _boards(calibration: Calibration) -> Float[ndarray, "views 4 3"]:
+    """The corners of each board's outline, camera frame, metres, beginning with that of corner 0."""
+    outline = _outline(calibration.detections.target)
+    return np.array([pose.apply(outline) for pose in calibration.camera_from_target]).reshape(-1, 4, 3)
+
+
+def _outline(target: Target) -> Float[ndarray, "4 3"]:
+    """The rectangle around the target's points, target frame."""
+    (x0, y0, _), (x1, y1, _) = target.points.min(0), target.points.max(0)
+    return np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]])
+
+
+def _frustum(camera: Camera, boards: Float[ndarray, "views 4 3"]) -> Float[ndarray, "8 2 3"]:
+    """The edges of the pyramid that the frame sees, camera frame; its depth a third of the nearest boards' distance."""
+    width, height = camera.image_size
+    intrinsics = camera.intrinsics
+    pixels = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]) - 0.5
+    plane = np.clip(intrinsics.to_plane(pixels), -np.tan(WIDEST), np.tan(WIDEST))
+    depth = 1 / 3 * float(np.quantile(np.linalg.norm(boards.mean(1), axis=-1), 0.1)) if len(boards) else 1.0
+    front = depth * np.concatenate([plane, np.ones((4, 1))], axis=-1)
+    return np.concatenate([np.stack([np.zeros((4, 3)), front], axis=1), np.stack([front, np.roll(front, -1, axis=0)], axis=1)])
+
+
+def _as_drawn(points: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3"]:
+    """Camera frame (x right, y down, z forward) to matplotlib's (right, into the page, up)."""
+    return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)

@@ -1,0 +1,128 @@
+"""The figures: whatever comes in, a Figure comes out whose axes say what they show and in which unit."""
+
+from __future__ import annotations
+
+import base64
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from numpy.testing import assert_allclose
+from PIL import Image  # comes with matplotlib
+
+from orthoscope.geometry.arrays import InputError
+from orthoscope.geometry.target import Detections
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lenses import LENSES, Brown, KannalaBrandt
+from orthoscope.report.figures import photograph_uri, residual_vectors, residuals_by_place, residuals_by_view, to_svg
+from orthoscope.report.figures.cells import Cells, cells_for
+from orthoscope.report.figures.lens import _along_angles, distortion_curve
+from orthoscope.report.figures.style import RED
+from orthoscope.report.plates import PLATES
+
+KINDS = ("ordinary", "fisheye", "unheld")  # pages of all of them are drawn in test_page.py
+UNITS = ("(px)", "(px per point)", "(m)", "(°)", "(name)", "(number in the table below)")
+
+for_every_plate = pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
+
+
+@for_every_plate
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_figure_of_every_evaluation_has_labelled_axes_with_units(plate, kind, every_evaluation):
+    figure = plate.draw(every_evaluation[kind])
+    assert isinstance(figure, Figure)
+    for axes in figure.axes:
+        last = axes.get_subplotspec() is None or axes.get_subplotspec().is_last_row()
+        bar = axes.get_label() == "<colorbar>"
+        labels = [axes.get_ylabel()] + ([axes.get_xlabel()] if last and not bar else [])
+        labels += [axes.get_zlabel()] if axes.name == "3d" else []
+        assert all(label.endswith(UNITS) for label in labels), labels
+
+
+@for_every_plate
+def test_a_calibration_without_corners_still_has_its_figures(plate, ordinary):
+    empty = Detections(ordinary.calibration.detections.target, (640, 480), ())
+    calibration = replace(ordinary.calibration, detections=empty, camera_from_target=())
+    to_svg(plate.draw(replace(ordinary, calibration=calibration, views=(), held_out_residuals=(), suspects=())), plate.name)
+
+
+def test_a_residual_arrow_starts_at_the_detected_corner_and_ends_at_the_predicted_one(ordinary):
+    calibration = ordinary.calibration
+    arrows = residual_vectors(calibration).axes[0].collections[0]
+    detected = np.concatenate([view.pixels for view in calibration.detections.views])
+    residuals = np.concatenate(calibration.residuals())
+    order = np.argsort(np.hypot(*residuals.T), kind="stable")
+    assert_allclose(arrows.get_offsets(), detected[order])
+    assert_allclose(np.stack([arrows.U, arrows.V], axis=-1), residuals[order])
+    assert (arrows.angles, arrows.scale_units) == ("xy", "xy")
+
+
+def test_residuals_by_place_are_the_held_out_ones_where_there_are_any(ordinary, unheld):
+    assert residuals_by_place(ordinary).axes[1].get_ylabel().startswith("held-out")
+    assert residuals_by_place(unheld).axes[1].get_ylabel().startswith("training")
+
+
+def test_a_suspect_is_named_and_coloured_among_few_views_and_among_many(suspicious):
+    few = residuals_by_view(suspicious).axes[0]
+    assert [label.get_text() for label in few.get_xticklabels() if to_hex(label.get_color()) == RED.lower()] == ["left04.jpg"]
+    many = tuple(replace(view, image=f"{i}-{view.image}") for i in range(8) for view in suspicious.views)
+    axes = residuals_by_view(replace(suspicious, views=many, suspects=(("5-left04.jpg", "odd"),))).axes[0]
+    assert [text.get_text() for text in axes.texts] == ["5-left04.jpg"]
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_the_distortion_curve_of_every_lens_can_be_drawn(name, ordinary):
+    camera = Camera((640, 480), Intrinsics(500.0, 500.0, 320.0, 240.0), LENSES[name]())
+    curve = distortion_curve(replace(ordinary.calibration, camera=camera)).axes[1].lines[0]
+    assert np.isfinite(curve.get_xydata()).all()
+
+
+def test_radial_displacement_is_the_formulas_own():
+    camera = Camera((640, 480), Intrinsics(500.0, 500.0, 320.0, 240.0), Brown(k1=-0.2))
+    angles = np.linspace(0.0, 0.6, 7)
+    radius, displacement = _along_angles(camera, angles)
+    s = np.tan(angles)[:, None]
+    assert_allclose(radius, np.broadcast_to(500.0 * (s - 0.2 * s**3), radius.shape), atol=1e-9)  # px; rounding of 500 px
+    assert_allclose(displacement, np.broadcast_to(-100.0 * s**3, displacement.shape), atol=1e-9)
+
+
+def test_displacement_of_a_lens_of_the_angle_is_taken_from_the_equidistant_image_past_90_degrees():
+    camera = Camera((640, 480), Intrinsics(150.0, 150.0, 320.0, 240.0), KannalaBrandt(k1=-0.01))
+    angles = np.array([0.0, 1.0, 1.7])
+    _, displacement = _along_angles(camera, angles)
+    assert_allclose(displacement[:, 0], -1.5 * angles**3, atol=1e-9)
+
+
+def test_cells_count_every_pixel_once_also_on_the_edges():
+    cells = Cells((640, 480), 8, 6)
+    edge = np.array([[-0.5, -0.5], [639.5, 479.5], [79.5, 0.0], [79.499, 0.0]])
+    assert cells.of(edge).tolist() == [0, 47, 1, 0]
+    assert cells.count(edge).sum() == 4
+
+
+def test_cell_means_are_nan_where_nothing_fell():
+    cells = Cells((4, 2), 2, 1)
+    assert_allclose(cells.mean(np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([1.0, 3.0])), [[2.0, np.nan]])
+
+
+@pytest.mark.parametrize("size", [(640, 480), (480, 640), (4000, 30), (1, 1)])
+def test_cells_are_nearly_square_and_about_as_many_as_wanted(size):
+    cells = cells_for(size, 100)
+    assert 1 <= cells.columns * cells.rows <= 120
+
+
+def test_a_wide_photograph_is_shrunk_by_a_whole_factor_and_blue_stays_blue():
+    image = np.zeros((40, 2300, 3), dtype=np.uint8)
+    image[..., 0] = 250
+    shown = Image.open(io.BytesIO(base64.b64decode(photograph_uri(image).partition(",")[2])))
+    assert shown.size == (766, 13)
+    assert_allclose(np.asarray(shown).reshape(-1, 3).mean(0), [0, 0, 250], atol=4)  # JPEG's own error
+
+
+@pytest.mark.parametrize("image", [np.zeros((4, 4)), np.zeros((4, 4, 4), np.uint8), np.zeros((0, 4), np.uint8)])
+def test_what_is_no_8_bit_photograph_is_an_input_error(image):
+    with pytest.raises(InputError, match="expected uint8"):
+        photograph_uri(image)
