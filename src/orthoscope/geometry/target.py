@@ -6,6 +6,7 @@ Floor 0.  A corner's *id* is its row in `Target.points`; a view lists ids, so pa
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -109,7 +110,7 @@ class Detections:
         """How many corners were seen in all views together."""
         return sum(len(view.ids) for view in self.views)
 
-    def only(self, indices: list[int] | ndarray) -> Detections:
+    def only(self, indices: Sequence[int] | ndarray) -> Detections:
         """The same, with the views of these indices only (nothing is set aside by it)."""
         return replace(self, views=tuple(self.views[i] for i in indices))
 

@@ -1,7 +1,11 @@
-"""Methods that make a calibration from detections, by name."""
+"""Methods that make a calibration from detections, by name.
+
+Floor 3.
+"""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -9,11 +13,15 @@ from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.target import Detections
 from orthoscope.methods.calibration import Calibration
 from orthoscope.methods.fccm import fccm
+from orthoscope.methods.mldc import mldc
+from orthoscope.methods.nmldc import nmldc
 
 __all__ = ["METHODS", "calibrate"]
 
 METHODS: dict[str, Callable[..., Calibration]] = {
     "fccm": fccm,
+    "mldc": mldc,
+    "nmldc": nmldc,
 }
 
 
@@ -24,4 +32,7 @@ def calibrate(detections: Detections, *, method: str = "fccm", **settings: Any) 
     """
     if method not in METHODS:
         raise InputError(f"method {method!r} is not known; expected one of {', '.join(METHODS)}.")
+    known = list(inspect.signature(METHODS[method]).parameters)[1:]
+    if unknown := sorted(set(settings) - set(known)):
+        raise InputError(f"method {method!r} has no setting {unknown[0]!r}; it has {', '.join(known)}.")
     return METHODS[method](detections, **settings)

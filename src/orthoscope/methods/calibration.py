@@ -68,7 +68,7 @@ class Calibration:
         if len(self.camera_from_target) != len(self.detections.views):
             raise InputError(f"{len(self.camera_from_target)} poses for {len(self.detections.views)} views; expected one for each.")
 
-    def residuals(self) -> tuple[Float[ndarray, "n 2"], ...]:
+    def residuals(self) -> tuple[Float[ndarray, "_ 2"], ...]:
         """Predicted minus detected, pixels, an array (n,2) for each view; the formula's own value where its domain has ended."""
         return residuals_of(self.camera, self.camera_from_target, self.detections)
 
@@ -78,7 +78,7 @@ class Calibration:
         return rms(np.concatenate(self.residuals()))
 
 
-def residuals_of(camera: Camera, camera_from_target: Sequence[Pose], detections: Detections) -> tuple[Float[ndarray, "n 2"], ...]:
+def residuals_of(camera: Camera, camera_from_target: Sequence[Pose], detections: Detections) -> tuple[Float[ndarray, "_ 2"], ...]:
     """Predicted minus detected, pixels, an array (n,2) for each view, for a camera and one pose for each view."""
     points = detections.target.points
     return tuple(

@@ -1,8 +1,8 @@
 """Closed forms that start a calibration: K from homographies (Zhang), poses from any camera.
 
 Floor 3.  B = K^-T K^-1 is the image of the absolute conic; each homography H = [h1 h2 h3] of the target's plane gives
-h1' B h2 = 0 and h1' B h1 = h2' B h2.  With few views B is narrowed, as the paper's section 3.1 and Zhang's 3.1 say: two views take skew = 0,
-one takes the principal point at the image's centre and fx = fy.
+h1' B h2 = 0 and h1' B h1 = h2' B h2.  With few views B is narrowed, as the paper's section 3.1 and Zhang's 3.1 say: two views take
+skew = 0, one takes the principal point at the image's centre and fx = fy.
 Z. Zhang, A flexible new technique for camera calibration, TPAMI 22(11), 2000.
 """
 
@@ -16,7 +16,7 @@ from orthoscope.geometry.projective import homographies_to_rays
 from orthoscope.methods.observations import Observations, Poses
 from orthoscope.models.camera import Camera, Intrinsics
 
-__all__ = ["intrinsics_of_homographies", "poses_of_camera"]
+__all__ = ["CENTRED", "CENTRED_SQUARE", "GENERAL", "NO_SKEW", "intrinsics_of_homographies", "poses_of_camera", "poses_of_homographies"]
 
 # B as (B11, B12, B22, B13, B23, B33); what each way of narrowing it leaves free
 GENERAL = np.eye(6)
@@ -30,8 +30,8 @@ def intrinsics_of_homographies(
 ) -> Intrinsics | None:
     """K from pixel homographies, or None where they belong to no real K of this image (noise, distortion, parallel views).
 
-    basis: which B are allowed, rows of (B11, B12, B22, B13, B23, B33): GENERAL, NO_SKEW, CENTRED or CENTRED_SQUARE, in pixels taken from the
-    image's centre.
+    basis: which B are allowed, rows of (B11, B12, B22, B13, B23, B33): GENERAL, NO_SKEW, CENTRED or CENTRED_SQUARE, in pixels taken
+    from the image's centre.
     """
     half = 0.5 * max(image_size)
     centre = 0.5 * (np.array(image_size) - 1.0)
@@ -39,7 +39,7 @@ def intrinsics_of_homographies(
     h = normal_from_pixels @ homographies
     h = h / np.sqrt((h[:, :, :2] ** 2).sum((1, 2), keepdims=True))  # each view one vote
     rows = np.concatenate([_conic_row(h[:, :, 0], h[:, :, 1]), _conic_row(h[:, :, 0], h[:, :, 0]) - _conic_row(h[:, :, 1], h[:, :, 1])])
-    b = np.linalg.svd(rows @ basis.T)[2][-1] @ basis
+    b = np.linalg.svd(np.linalg.qr(rows @ basis.T, mode="r"))[2][-1] @ basis
     return _intrinsics_of_conic(b if b[0] > 0 else -b, half, centre)
 
 
@@ -52,11 +52,15 @@ def poses_of_camera(camera: Camera, observations: Observations, points: Float[nd
     rays = camera.unproject(observations.pixels().reshape(-1, 2)).reshape(m, n, 3)
     weights = observations.present * np.isfinite(rays[..., 0])
     H = homographies_to_rays(points[observations.ids, :2], np.nan_to_num(rays), weights)
-    H = H * (2.0 / np.sqrt((H[:, :, :2] ** 2).sum(1)).sum(1))[:, None, None]
+    poses = poses_of_homographies(H)
+    return Poses(poses.rotation, np.where(weights.sum(1)[:, None] < 4, np.nan, poses.translation))
+
+
+def poses_of_homographies(homographies: Float[ndarray, "m 3 3"]) -> Poses:
+    """camera_from_target of homographies from the target's plane to rays, known up to a positive factor: Zhang's section 3.1."""
+    H = homographies * (2.0 / np.sqrt((homographies[:, :, :2] ** 2).sum(1)).sum(1))[:, None, None]
     axes = np.concatenate([H[:, :, :2], np.cross(H[:, :, 0], H[:, :, 1])[:, :, None]], axis=2)
-    translation = H[:, :, 2].copy()
-    translation[weights.sum(1) < 4] = np.nan
-    return Poses(nearest_rotation(axes), translation)
+    return Poses(nearest_rotation(axes), H[:, :, 2])
 
 
 def _conic_row(a: ndarray, b: ndarray) -> ndarray:

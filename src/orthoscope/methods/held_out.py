@@ -6,20 +6,20 @@ fitted.  Folds come from numpy's default_rng(seed), so the same data give the sa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
 
-from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.geometry.arrays import CalibrationError, Float, InputError, Int, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Detections
 from orthoscope.methods.calibration import Calibration, residuals_of
 from orthoscope.methods.resection import resect
 from orthoscope.models.camera import Camera
 
-__all__ = ["HeldOut", "held_out"]
+__all__ = ["HeldOut", "folds_of_views", "held_out"]
 
 FEWEST_VIEWS = 4  # with fewer, a fold would leave a calibration that rests on assumptions
 
@@ -28,11 +28,14 @@ Refit = Callable[[Detections], Calibration]
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """For each view of the detections, in order: the camera that had not seen it (None where there is none), its pose there, residuals (n,2)."""
+    """For each view of the detections, in order: the camera that had not seen it, the view's pose there, its residuals (n,2).
+
+    None, None and NaN where there is no such camera.
+    """
 
     cameras: tuple[Camera | None, ...]
     camera_from_target: tuple[Pose | None, ...]
-    residuals: tuple[Float[ndarray, "n 2"], ...]
+    residuals: tuple[Float[ndarray, "_ 2"], ...]
 
     @property
     def rms_px(self) -> float:
@@ -55,7 +58,12 @@ class HeldOut:
 
 
 def folds_of_views(views: int, folds: int, *, seed: int = 0) -> list[ndarray]:
-    """Indices of the views of each fold: a permutation of default_rng(seed), cut into nearly equal parts."""
+    """Indices of the views of each fold: a permutation of default_rng(seed), cut into nearly equal parts.
+
+    Raises InputError for fewer than two folds.
+    """
+    if folds < 2:
+        raise InputError(f"folds is {folds}; expected at least 2, so that there are views to learn from. 5 is usual.")
     return [np.sort(part) for part in np.array_split(np.random.default_rng(seed).permutation(views), min(folds, views))]
 
 
@@ -72,6 +80,7 @@ def held_out(
 
     executor: where the folds run; by default here, one after the other.  progress: called with (folds done, folds).
     A fold whose training views cannot tell the camera leaves its views without residuals (NaN); so do fewer than four views.
+    Raises InputError for fewer than two folds.
     """
     views = len(detections.views)
     cameras: list[Camera | None] = [None] * views
@@ -90,10 +99,10 @@ def held_out(
     return HeldOut(tuple(cameras), tuple(poses), tuple(residuals))
 
 
-def _fold(detections: Detections, refit: Refit, part: Sequence[int]) -> tuple[Camera, tuple[Pose, ...], tuple[ndarray, ...]] | None:
+def _fold(detections: Detections, refit: Refit, part: Int[ndarray, " f"]) -> tuple[Camera, tuple[Pose, ...], tuple[ndarray, ...]] | None:
     """Camera from the other views, poses and residuals of these; None where the others cannot tell."""
     others = np.setdiff1d(np.arange(len(detections.views)), part)
-    tested = detections.only(np.asarray(part))
+    tested = detections.only(part)
     try:
         camera = refit(detections.only(others)).camera
         poses = resect(camera, tested)

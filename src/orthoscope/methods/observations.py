@@ -18,7 +18,7 @@ from orthoscope.geometry.target import Detections
 
 __all__ = ["Observations", "Poses"]
 
-CHUNK = 4096  # corners that are linearised together: their intermediate arrays then stay in the processor's cache
+CHUNK = 8192  # corners that are linearised together: their intermediate arrays then stay in the processor's cache
 
 
 class Poses(NamedTuple):
@@ -26,6 +26,10 @@ class Poses(NamedTuple):
 
     rotation: ndarray
     translation: ndarray
+
+    def only(self, rows: Int[ndarray, " v"]) -> Poses:
+        """The poses of these rows."""
+        return Poses(self.rotation[rows], self.translation[rows])
 
 
 class Chunk(NamedTuple):
@@ -58,8 +62,8 @@ class Observations:
         counts = counts[order]
         present = np.arange(counts.max(initial=0)) < counts[:, None]
         ids, u, v = np.zeros(present.shape, dtype=np.int64), np.zeros(present.shape), np.zeros(present.shape)
-        ids[present] = np.concatenate([views[i].ids for i in order])
-        pixels = np.concatenate([views[i].pixels for i in order])
+        ids[present] = np.concatenate([np.empty(0, dtype=np.int64), *(views[i].ids for i in order)])
+        pixels = np.concatenate([np.empty((0, 2)), *(views[i].pixels for i in order)])
         u[present], v[present] = pixels[:, 0], pixels[:, 1]
         return cls(order, counts, ids, u, v, present.astype(float))
 
@@ -72,12 +76,15 @@ class Observations:
         """The table's pixels, padding included."""
         return np.stack([self.u, self.v], axis=-1)
 
-    def some(self, views: int) -> Observations:
-        """The same with at most so many views, evenly picked."""
-        picked = np.unique(np.linspace(0, len(self.order) - 1, views).round().astype(int))
-        width = int(self.counts[picked].max())
-        table = (array[picked, :width] for array in (self.ids, self.u, self.v, self.present))
-        return Observations(self.order[picked], self.counts[picked], *table)
+    def evenly(self, views: int) -> Int[ndarray, " v"]:
+        """At most so many rows, evenly picked."""
+        return np.unique(np.linspace(0, len(self.order) - 1, views).round().astype(int))
+
+    def only(self, rows: Int[ndarray, " v"]) -> Observations:
+        """The table of these rows (ascending)."""
+        width = int(self.counts[rows].max())
+        table = (array[rows, :width] for array in (self.ids, self.u, self.v, self.present))
+        return Observations(self.order[rows], self.counts[rows], *table)
 
     def chunks(self) -> list[Chunk]:
         """The table in pieces of about CHUNK corners."""

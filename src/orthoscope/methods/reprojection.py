@@ -17,8 +17,9 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.methods.observations import Chunk, Observations, Poses
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lens import Warp
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
 
@@ -39,14 +40,12 @@ class Reprojection:
     """The problem for given observations, target points (m,3) and free parameters.
 
     free: parameters of K and the lens that move; `fx=fy` ties two together; none of them leaves the camera fixed (resection).
-    Raises InputError for a parameter that the camera does not have.
+    Raises InputError for a parameter that the camera does not have, that is named twice, or that is K's where the lens has a frame of
+    its own (the lens then hides K: a straight image is fitted by itself).
     """
 
     def __init__(self, observations: Observations, points: Float[ndarray, "m 3"], camera: Camera, free: Sequence[str] = ()) -> None:
-        known = (*INTRINSICS, *camera.lens.names())
-        for name in (single for group in free for single in group.split("=")):
-            if name not in known:
-                raise InputError(f"the camera has no parameter {name!r}; it has {', '.join(known)}.")
+        _check_free(camera, free)
         self.free = tuple(free)
         self._coefficients = _coefficients(free)
         self._columns = [(i, single) for i, group in enumerate(free) for single in group.split("=")]
@@ -112,18 +111,25 @@ class Reprojection:
         by_lens = dict(zip(self._coefficients, at.by, strict=True))
         for i, name in self._columns:
             _add_parameter(stacked[:, i, :n], stacked[:, i, n:], name, at.x, at.y, frame, by_lens)
-        halves = (
-            (slice(None, n), frame.fx * at.j_xx + frame.skew * at.j_yx, frame.fx * at.j_xy + frame.skew * at.j_yy),
-            (slice(n, None), frame.fy * at.j_yx, frame.fy * at.j_yy),
-        )
-        for half, along_x, along_y in halves:
-            _set_pose(stacked[:, k:-1, half], pull_back(along_x, along_y), q, turn)
-        stacked[:, -1, :n] = frame.fx * at.x + frame.skew * at.y + (frame.cx - chunk.u)
-        stacked[:, -1, n:] = frame.fy * at.y + (frame.cy - chunk.v)
+        for half, predicted, seen, slopes in zip(
+            (slice(None, n), slice(n, None)), _pixels(at, frame), (chunk.u, chunk.v), _pixels_by_place(at, frame), strict=True
+        ):
+            _set_pose(stacked[:, k:-1, half], pull_back(*slopes), q, turn)
+            np.subtract(predicted, seen, out=stacked[:, -1, half])
         if chunk.present is not None:
             absent = np.concatenate([chunk.present, chunk.present], axis=1) == 0
             np.copyto(stacked, 0.0, where=absent[:, None])
         return stacked
+
+
+def _check_free(camera: Camera, free: Sequence[str]) -> None:
+    known = camera.lens.names() if camera.lens_frame else (*INTRINSICS, *camera.lens.names())
+    names = [name for group in free for name in group.split("=")]
+    for name in names:
+        if name not in known:
+            raise InputError(f"parameter {name!r} of this camera cannot be estimated; expected some of {', '.join(known)}.")
+        if names.count(name) > 1:
+            raise InputError(f"parameter {name!r} is to be estimated more than once; expected each name once. Drop the repeats.")
 
 
 def with_parameters(camera: Camera, free: Sequence[str], step: Float[ndarray, " k"]) -> Camera:
@@ -146,7 +152,7 @@ def parameter_columns(camera: Camera, x: ndarray, y: ndarray, free: Sequence[str
     for column, group in zip(columns, free, strict=True):
         for name in group.split("="):
             _add_parameter(column[0], column[1], name, at.x, at.y, frame, by_lens)
-    return columns, np.stack([frame.fx * at.x + frame.skew * at.y + frame.cx, frame.fy * at.y + frame.cy])
+    return columns, np.stack(_pixels(at, frame))
 
 
 def _coefficients(free: Sequence[str]) -> tuple[str, ...]:
@@ -158,6 +164,20 @@ def _squared(residual: ndarray, chunk: Chunk) -> ndarray:
     """|e|^2 of each corner of a chunk."""
     n = chunk.u.shape[1]
     return residual[:, :n] ** 2 + residual[:, n:] ** 2
+
+
+def _pixels(at: Warp, frame: Intrinsics) -> tuple[ndarray, ndarray]:
+    """u and v of distorted places."""
+    u = frame.fx * at.x + frame.cx
+    return u + frame.skew * at.y if frame.skew else u, frame.fy * at.y + frame.cy
+
+
+def _pixels_by_place(at: Warp, frame: Intrinsics) -> tuple[tuple[ndarray, ndarray], tuple[ndarray, ndarray]]:
+    """Derivatives of u, and of v, by the place (x, y) in the lens's chart."""
+    u_x, u_y = frame.fx * at.j_xx, frame.fx * at.j_xy
+    if frame.skew:
+        u_x, u_y = u_x + frame.skew * at.j_yx, u_y + frame.skew * at.j_yy
+    return (u_x, u_y), (frame.fy * at.j_yx, frame.fy * at.j_yy)
 
 
 def _add_parameter(u: ndarray, v: ndarray, name: str, x_d: ndarray, y_d: ndarray, frame: Intrinsics, by_lens) -> None:

@@ -1,6 +1,7 @@
 """Which views can take part in a calibration, and why the others cannot.
 
-Floor 3.
+Floor 3.  A view must fix a homography: four corners of which no three are on a line, so at least two off every line of the target;
+and it must not be seen edge-on, where all pixels are on a line too.
 """
 
 from __future__ import annotations
@@ -9,12 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from orthoscope.geometry.arrays import CalibrationError, ndarray
-from orthoscope.geometry.target import Detections, SetAside, View
+from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.geometry.target import Detections, SetAside, Target, View
 
 __all__ = ["screened"]
 
 FEWEST = 4  # corners that a homography needs
+THINNEST = 0.01  # of a view's length in the image is its width at least
 
 
 def screened(detections: Detections) -> Detections:
@@ -27,10 +29,8 @@ def screened(detections: Detections) -> Detections:
     seen: dict[bytes, str] = {}
     for view in detections.views:
         content = view.ids.tobytes() + view.pixels.tobytes()
-        if len(view.ids) < FEWEST:
-            aside.append(SetAside(view.image, f"{len(view.ids)} corners; a view needs {FEWEST}"))
-        elif _on_a_line(detections.target.points[view.ids]):
-            aside.append(SetAside(view.image, "all its corners are on one line of the target"))
+        if reason := _fault(view, detections.target):
+            aside.append(SetAside(view.image, reason))
         elif content in seen:
             aside.append(SetAside(view.image, f"the same corners as {seen[content]}"))
         else:
@@ -45,6 +45,32 @@ def screened(detections: Detections) -> Detections:
     return replace(detections, views=tuple(kept), set_aside=tuple(aside))
 
 
-def _on_a_line(points: ndarray) -> bool:
-    spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
-    return bool(spread[1] <= 1e-9 * spread[0])
+def _fault(view: View, target: Target) -> str | None:
+    """Why a view tells nothing; None where it does."""
+    if len(view.ids) < FEWEST:
+        return f"{len(view.ids)} corners; a view needs {FEWEST}"
+    off = _off_a_line(target.points[view.ids, :2])
+    if off < 2:
+        return f"all its corners{' but one' if off else ''} are on one line of the target"
+    if _thin(view.pixels):
+        return "all its corners are on one line in the image: the target is seen edge-on"
+    return None
+
+
+def _off_a_line(points: Float[ndarray, "n 2"]) -> int:
+    """How many points are off the line that has most of them, where that is none or one; else more than one."""
+    fewest = len(points)
+    for a, b in ((0, 1), (0, 2), (1, 2)):  # a line that misses one point at most goes through two of the first three
+        (along_x, along_y), (x, y) = points[b] - points[a], (points - points[a]).T
+        if along_x or along_y:
+            off = np.abs(along_x * y - along_y * x) > 1e-9 * (x * x + y * y).max()
+            fewest = min(fewest, int(off.sum()))
+    return fewest
+
+
+def _thin(pixels: Float[ndarray, "n 2"]) -> bool:
+    """Whether pixels are all but on a line, or all at one place."""
+    x, y = (pixels - pixels.mean(0)).T
+    xx, xy, yy = x @ x, x @ y, y @ y
+    longest = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)  # the larger eigenvalue; their product is the determinant
+    return bool(xx * yy - xy * xy <= THINNEST**2 * longest * longest)

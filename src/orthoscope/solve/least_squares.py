@@ -27,9 +27,16 @@ __all__ = ["NormalEquations", "Options", "Problem", "Solution", "Status", "share
 
 Unknowns = TypeVar("Unknowns")
 
+LEAST_DAMPING, MOST_DAMPING = 1e-15, 1e12
+OPEN = 1e-14  # an eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured in its direction
+TAKES_PART = 1e-8  # share (squared) of such a direction from which on an unknown is open too
+
 
 class NormalEquations(NamedTuple):
-    """The sums at one place: cost is the sum of rho, the rest as in the module's docstring; views m may be 0, widths p of C and k of A too."""
+    """The sums at one place: cost is the sum of rho, the rest as in the module's docstring.
+
+    There may be no views (m = 0), no shared unknowns (k = 0) and view blocks of any width p.
+    """
 
     cost: float
     A: Float[ndarray, "k k"]
@@ -56,7 +63,7 @@ class Status(StrEnum):
 
     CONVERGED = "converged"
     STEP_LIMIT = "stopped at the step limit; raise max_steps or give a better start"
-    STUCK = "stopped where no step lowers the cost, short of the tolerance; the data may not determine all unknowns"
+    STUCK = "stopped where only tiny steps lower the cost, short of a minimum; give a better start or fewer unknowns"
     NO_COST = "could not start: the cost at the starting values is not finite"
 
 
@@ -64,14 +71,15 @@ class Status(StrEnum):
 class Options:
     """How to solve.
 
-    tolerance: stop when a step promises to lower the cost by less than this share of it.  floor: or by less than this, absolutely, in
-    the residual's unit squared (noise-free data).  damping: lambda at the start.  damp: "diagonal" or "identity".
-    progress: called after each step with (step, cost).
+    tolerance: stop when a step promises to lower the cost by no more than this share of it.  floor: or by no more than this, absolutely,
+    in the residual's unit squared (noise-free data).  damping: lambda at the start.  damp: "diagonal" or "identity".
+    progress: called after each step that lowered the cost, with (step, cost).
+    Raises InputError where damp is another word.
     """
 
     max_steps: int = 100
     tolerance: float = 1e-11
-    floor: float = 1e-20
+    floor: float = 1e-18
     damping: float = 1e-6
     damp: str = "diagonal"
     progress: Callable[[int, float], None] | None = None
@@ -83,7 +91,7 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Solution(Generic[Unknowns]):
-    """Where a solve ended: the unknowns, the sums there, how many steps were taken and why it stopped."""
+    """Where a solve ended: the unknowns, the sums there, how many steps were tried and why it stopped."""
 
     unknowns: Unknowns
     sums: NormalEquations
@@ -97,77 +105,113 @@ class Solution(Generic[Unknowns]):
 
 
 def solve(problem: Problem[Unknowns], start: Unknowns, *, loss: Loss | None = None, options: Options | None = None) -> Solution[Unknowns]:
-    """The unknowns that minimise the problem's cost, near the start."""
+    """The unknowns that minimise the problem's cost, near the start; the solution's status says how it ended."""
     loss, options = loss or Linear(), options or Options()
     here, sums = start, problem.linearise(start, loss)
     if not np.isfinite(sums.cost):
         return Solution(here, sums, 0, Status.NO_COST)
-    damping, growth = options.damping, 2.0
-    for step in range(1, options.max_steps + 1):
-        shared, views, promised = _damped_step(sums, damping, options.damp)
-        settled = promised <= options.tolerance * sums.cost + options.floor
-        there = problem.move(here, shared, views) if np.isfinite(promised) else here
-        trial = problem.linearise(there, loss)
-        gained = sums.cost - trial.cost
-        if np.isfinite(promised) and np.isfinite(trial.cost) and gained >= 0:
+    damping, steps = _Damping(options.damping), 0
+    while True:
+        shared, views, promised = _damped_step(sums, damping.value, options.damp)
+        if status := _ending(sums, promised, damping.value, steps, options):
+            return Solution(here, sums, steps, status)
+        steps += 1
+        there, trial, gained = here, sums, -np.inf
+        if 0.0 < promised < np.inf:
+            there = problem.move(here, shared, views)
+            trial = problem.linearise(there, loss)
+            gained = sums.cost - trial.cost  # NaN or -inf where there is no solution
+        if gained >= 0.0:
             here, sums = there, trial
+            damping.loosen(gained / promised)
             if options.progress:
-                options.progress(step, sums.cost)
-            if settled:
-                return Solution(here, sums, step, Status.CONVERGED)
-            ratio = gained / promised if promised > 0 else 1.0
-            damping *= 0.1 if ratio > 0.75 else max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
-            damping, growth = max(damping, 1e-15), 2.0
-        elif settled or (np.isfinite(trial.cost) and -gained <= 1e-13 * sums.cost):
-            return Solution(here, sums, step, Status.CONVERGED)  # what is left is rounding
+                options.progress(steps, sums.cost)
         else:
-            damping, growth = max(damping, 1e-8) * growth, 2.0 * growth
-            if damping > 1e12:
-                return Solution(here, sums, step, Status.STUCK)
-    return Solution(here, sums, options.max_steps, Status.STEP_LIMIT)
+            damping.tighten()
 
 
 def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray, "k k"]:
-    """Covariance of the shared unknowns for noise as large as the residuals found; infinite where the data do not determine them.
+    """Covariance of the shared unknowns for noise as large as the residuals found.
 
-    measurements: how many numbers were measured (two for each corner).  The variance is cost / (measurements - unknowns).
+    measurements: how many numbers were measured (two for each corner).  The variance is cost / (measurements - unknowns).  Rows and
+    columns of unknowns that the data leave open are infinite.
     """
-    k, unknowns = len(sums.a), len(sums.a) + sums.c.size
-    eliminated, _, _ = _eliminate(sums, 0.0, "diagonal")
-    scale = np.sqrt(np.maximum(np.diag(sums.A), 1e-300))  # conditioning is judged between unknowns of like size
-    values, vectors = np.linalg.eigh(eliminated / np.outer(scale, scale))
+    unknowns = sums.a.size + sums.c.size
     variance = sums.cost / max(measurements - unknowns, 1)
-    if k == 0 or values[0] <= 1e-15 * k:
-        return np.full((k, k), np.inf)
-    return variance * (vectors / values) @ vectors.T / np.outer(scale, scale)
+    eliminated, _ = _eliminate(sums, sums.A, _inverse(sums.C))
+    scale = np.sqrt(_weights(sums.A, "diagonal"))  # conditioning is judged between unknowns of like size
+    values, vectors = np.linalg.eigh(eliminated / np.outer(scale, scale))
+    covariance = variance * (vectors / np.maximum(values, OPEN)) @ vectors.T / np.outer(scale, scale)
+    is_open = (vectors[:, values <= OPEN] ** 2).sum(1) > TAKES_PART
+    covariance[is_open] = covariance[:, is_open] = np.inf
+    return covariance
+
+
+class _Damping:
+    """lambda, after Nielsen: less the better a step kept its promise, more and ever faster after steps that raised the cost.
+
+    Faster than his: a narrow valley (rational lenses have them) is walked with hardly any damping and left with a lot.
+    """
+
+    def __init__(self, value: float) -> None:
+        self.value, self._growth = value, 2.0
+
+    def loosen(self, ratio: float) -> None:
+        """After a step that gained `ratio` times what it had promised."""
+        factor = 0.1 if ratio > 0.75 else max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
+        self.value, self._growth = max(factor * self.value, LEAST_DAMPING), 2.0
+
+    def tighten(self) -> None:
+        """After a step that was not taken."""
+        self.value, self._growth = self._growth * max(self.value, 1e-12), 4.0 * self._growth
+
+
+def _ending(sums: NormalEquations, promised: float, damping: float, steps: int, options: Options) -> Status | None:
+    """Whether to end, and how: a damped step that promises nothing is only a minimum if one as free as the first promises nothing too."""
+    if _is_little(promised, sums, options):
+        free = promised if damping <= options.damping else _damped_step(sums, options.damping, options.damp)[2]
+        return Status.CONVERGED if _is_little(free, sums, options) else Status.STUCK
+    if damping > MOST_DAMPING:
+        return Status.STUCK
+    return Status.STEP_LIMIT if steps >= options.max_steps else None
+
+
+def _is_little(promised: float, sums: NormalEquations, options: Options) -> bool:
+    """Whether a promised reduction of the cost is not worth a step."""
+    return abs(promised) <= options.tolerance * sums.cost + options.floor
 
 
 def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndarray, ndarray, float]:
-    """Shared step, view steps, and the reduction of the cost that the quadratic model promises."""
-    eliminated, right, inverse = _eliminate(sums, damping, damp)
-    shared = -np.linalg.lstsq(eliminated, right, rcond=None)[0] if _singular(eliminated) else -np.linalg.solve(eliminated, right)
+    """Shared step, view steps, and the reduction of the cost that the quadratic model promises; NaN where there is no such step."""
+    of_shared, of_views = damping * _weights(sums.A, damp), damping * _weights(sums.C, damp)
+    try:
+        inverse = np.linalg.inv(sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2]))
+        eliminated, right = _eliminate(sums, sums.A + np.diag(of_shared), inverse)
+        shared = -np.linalg.solve(eliminated, right)
+    except np.linalg.LinAlgError:  # singular as far as numbers go
+        return np.zeros_like(sums.a), np.zeros_like(sums.c), float("nan")
     views = -(inverse @ (sums.c + shared @ sums.B)[:, :, None])[:, :, 0]
-    damped = damping * (_weights(sums.A, damp) @ shared**2 + (_weights(sums.C, damp) * views**2).sum())
+    damped = of_shared @ shared**2 + (of_views * views**2).sum()
     return shared, views, float(-(sums.a @ shared) - (sums.c * views).sum() + damped)
 
 
-def _eliminate(sums: NormalEquations, damping: float, damp: str) -> tuple[ndarray, ndarray, ndarray]:
-    """The shared system after the views are eliminated, its right side, and C^-1 of each view, all damped."""
+def _eliminate(sums: NormalEquations, A: ndarray, inverse: ndarray) -> tuple[ndarray, ndarray]:
+    """The shared system and its right side after the views are eliminated.  inverse: C^-1 of each view; it and A may be damped."""
     m, k, p = sums.B.shape
-    C = sums.C + damping * _weights(sums.C, damp)[:, :, None] * np.eye(p)
-    inverse = np.linalg.inv(C) if m else C
     B = sums.B.transpose(1, 0, 2).reshape(k, m * p)
     Y = (sums.B @ inverse).transpose(1, 0, 2).reshape(k, m * p)
-    eliminated = sums.A + damping * np.diag(_weights(sums.A, damp)) - Y @ B.T
-    return eliminated, sums.a - Y @ sums.c.reshape(-1), inverse
+    return A - Y @ B.T, sums.a - Y @ sums.c.reshape(-1)
+
+
+def _inverse(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:
+    """The inverse of each block; in a direction where nothing was measured, what rounding would have measured there."""
+    scale = np.sqrt(_weights(C, "diagonal"))
+    values, vectors = np.linalg.eigh(C / (scale[:, :, None] * scale[:, None, :]))
+    vectors = vectors / scale[:, :, None]
+    return (vectors / np.maximum(values, OPEN)[:, None]) @ vectors.transpose(0, 2, 1)
 
 
 def _weights(block: ndarray, damp: str) -> ndarray:
     """What damping is multiplied by on the diagonal of a block (or of each of a stack)."""
     diagonal = np.diagonal(block, axis1=-2, axis2=-1)
     return np.maximum(diagonal, 1e-12) if damp == "diagonal" else np.ones_like(diagonal)
-
-
-def _singular(matrix: ndarray) -> bool:
-    diagonal = np.diag(matrix)
-    return bool(len(diagonal)) and not (diagonal > 0).all()

@@ -1,0 +1,195 @@
+"""The verdict: it counts what was not used, and its sentences are true of sets whose truth is known."""
+
+from __future__ import annotations
+
+import re
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from orthoscope.evaluate.evaluation import Evaluation, evaluate, evaluate_on
+from orthoscope.evaluate.metrics import corners_by_cell
+from orthoscope.evaluate.simulate import Scene, random_views, simulate_detections
+from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.pose import Pose, rotation_from_vector
+from orthoscope.geometry.target import Detections, View, chessboard
+from orthoscope.methods.calibration import rms
+from orthoscope.methods.fccm import fccm
+from orthoscope.methods.held_out import held_out
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lenses import Brown, KannalaBrandt
+
+CAMERA = Camera((640, 480), Intrinsics(520.0, 524.0, 325.0, 236.0), Brown(k1=-0.28, k2=0.09, p1=1e-3))
+BOARD = chessboard(9, 6, 0.025)
+NOISE = 0.2  # px per coordinate
+
+
+def photographed(views: int, *, camera: Camera = CAMERA, noise_px: float = NOISE, seed: int = 0, **how) -> Detections:
+    rng = np.random.default_rng(seed)
+    return simulate_detections(Scene(camera, BOARD, random_views(camera, BOARD, views, rng=rng, **how)), noise_px=noise_px, rng=rng)
+
+
+@pytest.fixture(scope="module")
+def good() -> Evaluation:
+    return evaluate(fccm(photographed(15), lens="brown"))
+
+
+def test_a_good_set_gets_its_error_with_its_uncertainty_and_no_warning(good):
+    assert good.warnings == ()
+    assert good.suspects == ()
+    told = re.fullmatch(
+        r"(0\.\d\d) ± (0\.\d\d) px on photographs that were not used \((0\.\d\d) px on those that were\); "
+        r"it holds over (\d+) % of the frame\.",
+        good.verdict,
+    )
+    assert told
+    assert tuple(map(float, told.groups())) == tuple(
+        float(f"{value:.2f}") for value in (good.held_out_rms_px, good.held_out_error_px, good.rms_px, 100 * good.coverage)
+    )
+
+
+def test_its_numbers_are_those_of_the_noise(good):
+    n, unknowns = 2 * good.calibration.detections.corners, 9 + 6 * 15
+    assert_allclose(good.rms_px, NOISE * np.sqrt(2.0 * (1.0 - unknowns / n)), rtol=0.06)  # 810 corners tell it to 1.8 %: three of these
+    assert good.rms_px < good.held_out_rms_px < 1.1 * good.rms_px
+    assert_allclose(good.median_px, NOISE * np.sqrt(2.0 * np.log(2.0)), rtol=0.1)  # Rayleigh's median
+    assert 3.0 * NOISE < good.largest_px < 5.0 * NOISE
+    assert_allclose(good.nce, NOISE * np.sqrt(np.pi / 2.0) / np.sqrt(1.0 / 6.0), rtol=0.1)  # Rayleigh's mean over 0.408 px
+
+
+def test_views_are_told_one_by_one_and_add_up(good):
+    residuals = good.calibration.residuals()
+    assert [view.image for view in good.views] == [view.image for view in good.calibration.detections.views]
+    assert_allclose([view.rms_px for view in good.views], [rms(e) for e in residuals])
+    assert_allclose([view.held_out_rms_px for view in good.views], [rms(e) for e in good.held_out_residuals])
+    assert_allclose(np.mean([view.held_out_rms_px**2 for view in good.views]), good.held_out_rms_px**2)
+    assert good.coverage == (corners_by_cell(good.calibration.detections) > 0).mean()
+
+
+def test_what_is_held_out_is_held_out_by_the_calibrations_own_method_and_settings():
+    calibration = fccm(photographed(8), lens="brown:k1", loss="huber", loss_scale=0.5)
+    expected = held_out(calibration.detections, lambda some: fccm(some, lens="brown:k1", loss="huber", loss_scale=0.5), folds=4)
+    with ThreadPoolExecutor(2) as executor:
+        evaluation = evaluate(calibration, folds=4, executor=executor)
+    assert_array_equal(np.array(evaluation.held_out_residuals), np.array(expected.residuals))
+
+
+def test_a_lens_that_folds_over_inside_the_data_is_not_to_be_trusted():
+    wide = Camera((640, 480), Intrinsics(320.0, 320.0, 320.0, 240.0), KannalaBrandt(k1=-0.02))
+    evaluation = evaluate(fccm(photographed(12, camera=wide), lens="brown:k1"), folds=2)
+    assert evaluation.verdict.startswith("Do not trust this lens formula: it folds over inside the data")
+    assert any(
+        re.search(r"folds over at 5\d\.\d degrees from the axis, before \d+ of 648 corners", warning) for warning in evaluation.warnings
+    )
+
+
+def test_a_lens_with_too_many_coefficients_for_its_corners_has_learnt_the_photographs():
+    detections = photographed(6, noise_px=0.5)
+    rng = np.random.default_rng(0)
+
+    def nine(view: View) -> View:
+        keep = rng.choice(len(view.ids), 9, replace=False)
+        return View(view.image, view.ids[keep], view.pixels[keep])
+
+    few = replace(detections, views=tuple(nine(view) for view in detections.views))
+    evaluation = evaluate(fccm(few, lens="brown:k1,k2,p1,p2,k3,s1,s2,s3,s4"), folds=6)
+    assert evaluation.held_out_rms_px > 1.5 * evaluation.rms_px
+    assert "it has learnt these photographs, not the camera" in evaluation.verdict
+
+
+@pytest.mark.parametrize("views", [2, 3])
+def test_too_few_views_say_that_nothing_was_held_out(views):
+    evaluation = evaluate(fccm(photographed(views, tilt=(0.4, 0.7)), lens="brown:k1"))
+    assert np.isnan(evaluation.held_out_rms_px)
+    assert all(np.isnan(view.held_out_rms_px) for view in evaluation.views)
+    assert "too few views to hold any out. Take more photographs before trusting it." in evaluation.verdict
+    assert any(warning.startswith(f"only {views} views; 15 or more") for warning in evaluation.warnings)
+    assert np.isfinite(evaluation.nce)  # of the training views then
+
+
+def test_assumptions_stand_among_the_warnings():
+    calibration = fccm(photographed(2, tilt=(0.4, 0.7)), lens="brown:k1")
+    assert calibration.assumptions == evaluate(calibration).warnings[:1] == ("two views: skew is taken as 0",)
+
+
+def test_one_view_is_not_called_views():
+    camera = Camera((640, 480), Intrinsics(520.0, 520.0, 319.5, 239.5), Brown(k1=-0.2))
+    evaluation = evaluate(fccm(photographed(1, camera=camera, tilt=(0.4, 0.7), fill=(0.7, 0.9)), lens="brown:k1"))
+    assert any(warning.startswith("only 1 view;") for warning in evaluation.warnings)
+
+
+def test_a_solver_that_did_not_converge_is_told_of():
+    evaluation = evaluate(fccm(photographed(8), max_steps=1))
+    assert any(warning.startswith("the solver stopped at the step limit") for warning in evaluation.warnings)
+
+
+@pytest.mark.parametrize("odd", [0, 7, 11])
+def test_a_view_whose_corners_were_badly_found_is_named_and_no_other(odd):
+    detections = photographed(12)
+    views = list(detections.views)
+    views[odd] = replace(views[odd], pixels=views[odd].pixels + np.random.default_rng(odd).normal(scale=3.0, size=views[odd].pixels.shape))
+    evaluation = evaluate(fccm(replace(detections, views=tuple(views))))
+    (suspect,) = evaluation.suspects
+    assert suspect[0] == views[odd].image
+    assert re.match(r"[2-6]\.\d\d px rms where a typical view has 0\.\d\d", suspect[1])
+    assert evaluation.verdict.startswith(f"Look at {views[odd].image} first; as it is, ")
+    assert any(warning.startswith(f"{views[odd].image} does not belong: ") for warning in evaluation.warnings)
+
+
+NINTHS = {
+    (0, 0): "at the top left", (0, 1): "at the top", (0, 2): "at the top right",
+    (1, 0): "in the middle left", (1, 1): "in the middle", (1, 2): "in the middle right",
+    (2, 0): "at the bottom left", (2, 1): "at the bottom", (2, 2): "at the bottom right",
+}  # fmt: skip
+
+
+def small_boards_but_for(empty: tuple[int, int]) -> Detections:
+    """A small board, tilted, in the middle of each ninth of the frame but one."""
+    rng, poses = np.random.default_rng(0), []
+    for row, column in NINTHS:
+        if (row, column) != empty:
+            sight = CAMERA.unproject(np.array([[(column + 0.5) * 640 / 3, (row + 0.5) * 480 / 3]]))[0]
+            rotation = rotation_from_vector(rng.uniform(-0.6, 0.6, 3))
+            poses.append(Pose(rotation, 2.5 * sight - rotation @ BOARD.points.mean(0)))
+    return simulate_detections(Scene(CAMERA, BOARD, tuple(poses)), noise_px=0.02, rng=rng)
+
+
+@pytest.mark.parametrize("empty", NINTHS, ids=NINTHS.values())
+def test_the_place_that_no_photograph_covers_is_named(empty):
+    evaluation = evaluate(fccm(small_boards_but_for(empty), lens="brown:k1"), folds=2)
+    assert 0.3 < evaluation.coverage < 0.6
+    (warning,) = (warning for warning in evaluation.warnings if warning.startswith("corners cover"))
+    assert warning.endswith(f"Next, photograph the target {NINTHS[empty]}")
+    assert f"{100 * evaluation.coverage:.0f} % of the frame" in warning
+
+
+def test_a_verdict_over_a_part_of_the_frame_says_so():
+    evaluation = evaluate(fccm(small_boards_but_for((0, 0)), lens="brown:k1"))
+    assert re.search(rf", where corners were seen: {100 * evaluation.coverage:.0f} % of the frame\.$", evaluation.verdict)
+
+
+# --- other photographs -----------------------------------------------------------------------------------------------
+
+
+def test_a_camera_is_judged_on_other_photographs_by_their_poses_alone():
+    camera, fresh = fccm(photographed(12)).camera, photographed(6, seed=1)
+    unseen = evaluate_on(camera, fresh)
+    assert unseen.detections.views == fresh.views
+    assert_allclose(unseen.rms_px, NOISE * np.sqrt(2.0 * (1.0 - 6.0 / 108.0)), rtol=0.12)  # 324 corners tell it to 3 %
+    assert len(unseen.view_rms_px) == 6
+    assert_allclose(np.mean(np.square(unseen.view_rms_px)), unseen.rms_px**2)
+    assert unseen.nce > 0
+
+
+def test_photographs_of_another_size_are_refused():
+    other = replace(photographed(3), image_size=(1280, 960))
+    with pytest.raises(InputError, match="these photographs are 1280x960; the camera was calibrated at 640x480"):
+        evaluate_on(CAMERA, other)
+
+
+def test_photographs_that_show_nothing_are_refused():
+    with pytest.raises(CalibrationError, match="no view of"):
+        evaluate_on(CAMERA, photographed(3).only([]))
