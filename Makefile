@@ -1,12 +1,13 @@
 # make demo    the main job, with photographs that it renders itself
 # make test    the tests
+# make picture the picture in README.md, from the demo
 # make check   all that CI checks: format, lint, types, floors, tests
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test quick check format lint types floors clean
+.PHONY: demo test quick check format lint types floors picture clean
 
 demo: $(VENV)/installed
 	$(BIN)/orthoscope demo -o demo
@@ -41,3 +42,6 @@ $(VENV)/installed: pyproject.toml
 
 clean:
 	rm -rf $(VENV) demo
+
+picture: demo
+	$(BIN)/python docs/make_picture.py demo docs/images/demo.png
