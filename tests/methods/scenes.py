@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 from orthoscope.evaluate.simulate import Scene, random_views, simulate_detections
 from orthoscope.geometry.pose import Pose, rotation_from_vector
@@ -77,13 +78,14 @@ def image_difference(camera: Camera, other: Camera, pixels: np.ndarray) -> np.nd
 
 
 def worst_image(camera: Camera, other: Camera, detections: Detections, samples: int = 20) -> float:
-    """The largest image difference over the box of the corners, the part of the frame that they cover.
+    """The largest image difference over the part of the frame that corners cover: their convex hull.
 
-    Places that the first camera does not see (a fisheye's box has corners beyond its image) are left out.
+    Places of it that the first camera does not see (beside a fisheye's image, say) are left out.
     """
     pixels = np.concatenate([view.pixels for view in detections.views])
     low, high = pixels.min(0), pixels.max(0)
     x, y = np.meshgrid(np.linspace(low[0], high[0], samples), np.linspace(low[1], high[1], samples))
-    grid = np.concatenate([np.stack([x.ravel(), y.ravel()], axis=-1), pixels])
-    grid = grid[np.isfinite(camera.unproject(grid)[:, 0])]
-    return float(image_difference(camera, other, grid).max())
+    grid = np.stack([x.ravel(), y.ravel()], axis=-1)
+    covered = np.concatenate([pixels, grid[Delaunay(pixels).find_simplex(grid) >= 0]])
+    covered = covered[np.isfinite(camera.unproject(covered)[:, 0])]
+    return float(image_difference(camera, other, covered).max())

@@ -1,1 +1,66 @@
-def main(): ...
+"""The command line: each verb one arrow of the flow, in a file of its own.
+
+Floor 7, the only one that prints.  Numbers go to stdout, progress and remarks to stderr.  Exit 0: done; 1: the data cannot answer; 2: the
+command or what it was given is wrong.  Nothing but click is imported here and at the head of a verb, so that `--help` is instant.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from orthoscope.cli.calibrate import calibrate
+from orthoscope.cli.demo import demo
+from orthoscope.cli.detect import detect
+from orthoscope.cli.evaluate import evaluate
+from orthoscope.cli.export import export
+from orthoscope.cli.report import report
+from orthoscope.cli.simulate import simulate
+from orthoscope.cli.undistort import undistort
+from orthoscope.version import __version__
+
+__all__ = ["main", "verbs"]
+
+EXAMPLE = """\b
+Example:
+  orthoscope calibrate photos/ --target chessboard:9x6:25mm -o camera/
+"""
+
+
+@click.group(epilog=EXAMPLE, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(__version__, prog_name="orthoscope")
+def verbs() -> None:
+    """Photographs of a flat target in, a camera that can be trusted out."""
+
+
+for verb in (calibrate, detect, evaluate, undistort, export, report, simulate, demo):
+    verbs.add_command(verb)
+
+
+def main() -> None:
+    """Run the command line; errors become one message and an exit code."""
+    try:
+        verbs(standalone_mode=False)
+    except click.exceptions.Exit as leave:
+        sys.exit(leave.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("stopped; files already written are whole", err=True)
+        sys.exit(130)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.exit(0)
+    except (ValueError, RuntimeError) as error:
+        _leave(error)
+
+
+def _leave(error: Exception) -> None:
+    """Exit with the message and code of an error of ours; any other is a defect and keeps its traceback."""
+    from orthoscope.geometry.arrays import CalibrationError, InputError
+
+    if not isinstance(error, InputError | CalibrationError):
+        raise error
+    click.echo(f"orthoscope: {error}", err=True)
+    sys.exit(2 if isinstance(error, InputError) else 1)

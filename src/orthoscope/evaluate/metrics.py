@@ -1,4 +1,4 @@
-"""Error measures: the paper's NCE, and how much of the frame the corners cover.
+"""Error measures in space: the paper's NCE.
 
 Floor 4.
 """
@@ -9,14 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
+from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Detections
 from orthoscope.models.camera import WIDEST, Camera, Intrinsics
 
-__all__ = ["COVERAGE_GRID", "corners_by_cell", "lateral_errors", "normalised_calibration_error"]
-
-COVERAGE_GRID = (8, 6)  # cells across and down by which the frame is said to be covered
+__all__ = ["lateral_errors", "normalised_calibration_error"]
 
 
 def normalised_calibration_error(estimated: Float[ndarray, "n 3"], observed: Float[ndarray, "n 3"], intrinsics: Intrinsics) -> float:
@@ -47,11 +45,3 @@ def lateral_errors(camera: Camera, camera_from_target: Sequence[Pose], detection
     usable = (rays[:, 2] > np.cos(WIDEST)) & (observed[:, 2] > np.cos(WIDEST) * np.sqrt((observed**2).sum(-1)))
     rays, observed = rays[usable], observed[usable]
     return rays * (observed[:, 2] / rays[:, 2])[:, None], observed
-
-
-def corners_by_cell(detections: Detections, grid: tuple[int, int] = COVERAGE_GRID) -> Int[ndarray, "rows columns"]:
-    """How many corners were seen in each cell of a grid (columns, rows) over the frame."""
-    pixels = np.concatenate([view.pixels for view in detections.views])
-    width, height = detections.image_size
-    edges_x, edges_y = np.linspace(-0.5, width - 0.5, grid[0] + 1), np.linspace(-0.5, height - 0.5, grid[1] + 1)
-    return np.histogram2d(pixels[:, 1], pixels[:, 0], bins=(edges_y, edges_x))[0].astype(np.int64)

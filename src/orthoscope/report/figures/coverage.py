@@ -1,8 +1,7 @@
 """Where corners were seen, and where none was.
 
 Floor 6.  The cells are those whose share the evaluation calls coverage.  A camera may be trusted where corners were seen; elsewhere its
-lens formula only extrapolates.  Places outside the image circle of
-a wide lens, where no ray falls, are not missed.
+lens formula only extrapolates.
 """
 
 from __future__ import annotations
@@ -12,10 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from orthoscope.evaluate.metrics import COVERAGE_GRID
+from orthoscope.evaluate.coverage import COVERAGE_GRID, cells_with_rays
 from orthoscope.geometry.arrays import Bool, ndarray
 from orthoscope.methods.calibration import Calibration
-from orthoscope.models.camera import Camera
 from orthoscope.report.figures.cells import Cells
 from orthoscope.report.figures.style import BLUE, DENSE, EMPTY, RED, frame_figure, styled
 
@@ -33,7 +31,7 @@ def coverage(calibration: Calibration) -> Figure:
     pixels = np.concatenate([view.pixels for view in detections.views]) if detections.views else np.empty((0, 2))
     cells = Cells(detections.image_size, *COVERAGE_GRID)
     empty = cells.count(pixels) == 0
-    reached = _reached(calibration.camera, cells)
+    reached = cells_with_rays(calibration.camera)
     _fill(axes, cells, empty & reached, MISSING)
     _fill(axes, cells, empty & ~reached, NO_RAY)
     axes.set_xticks(cells.x_edges, minor=True)
@@ -44,14 +42,6 @@ def coverage(calibration: Calibration) -> Figure:
     axes.scatter(*pixels.T, s=3 if many else 7, color=BLUE, alpha=0.35 if many else 0.6, linewidth=0, rasterized=many)
     _legend(axes, int((empty & reached).sum()), int((empty & ~reached).sum()), empty.size)
     return figure
-
-
-def _reached(camera: Camera, cells: Cells) -> Bool[ndarray, "rows columns"]:
-    """Which cells have a ray at their middle or at one of their corners."""
-    corners = np.stack(np.meshgrid(cells.x_edges, cells.y_edges), axis=-1).reshape(-1, 2)
-    at_corner = np.isfinite(camera.unproject(corners)[:, 2]).reshape(cells.rows + 1, cells.columns + 1)
-    at_middle = np.isfinite(camera.unproject(cells.centres.reshape(-1, 2))[:, 2]).reshape(cells.rows, cells.columns)
-    return at_middle | at_corner[1:, 1:] | at_corner[1:, :-1] | at_corner[:-1, 1:] | at_corner[:-1, :-1]
 
 
 def _fill(axes: Axes, cells: Cells, which: Bool[ndarray, "rows columns"], look: dict) -> None:

@@ -1,0 +1,123 @@
+"""`orthoscope calibrate`: photographs, or corners found before, to a camera with its report.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from orthoscope.cli import options
+
+__all__ = ["calibrate", "calibrate_into"]
+
+EXAMPLE = """\b
+Example:
+  $ orthoscope calibrate photos/ --target chessboard:9x6:25mm -o camera/
+  views      13 used, 0 set aside; 702 corners
+  rms        0.182 px per point (median 0.116, largest 1.09)
+  held out   0.191 ± 0.008 px per point, on views that were not used
+  NCE        0.427 (1 is what rounding to whole pixels would give)
+  camera     fx 533.04 ± 0.61  fy 533.13 ± 0.62  cx 341.48 ± 0.87  cy 234.36 ± 0.94
+  lens       brown  k1 -0.2827 ± 0.0046  k2 0.035 ± 0.033 ...
+  verdict    0.19 ± 0.01 px on photographs that were not used; it holds over 71 % of the frame.
+  wrote      camera/detections.json, camera/calibration.json, camera/report.html
+
+\b
+PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@options.photos
+@options.target
+@options.lens
+@options.method
+@options.skew
+@options.loss
+@options.image_size
+@options.folds
+@options.jobs
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("camera"), show_default=True, help="Folder to write."
+)
+@click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
+@options.keep
+@click.option("--report/--no-report", default=True, help="Whether to write OUT/report.html.")
+@options.as_json
+def calibrate(photos: tuple[str, ...], **settings: Any) -> None:
+    """Calibrate a camera from photographs of a flat target."""
+    calibrate_into(photos, **settings)
+
+
+def calibrate_into(
+    photos: tuple[str, ...],
+    *,
+    target: str | None,
+    out: Path,
+    lens: str = "auto",
+    method: str = "fccm",
+    skew: bool = False,
+    loss: str = "linear",
+    image_size: tuple[int, int] | None = None,
+    folds: int = 5,
+    jobs: int | None = None,
+    undistort: bool = False,
+    keep: str = "all",
+    report: bool = True,
+    as_json: bool = False,
+) -> Any:
+    """The main job; prints the summary and returns the evaluation."""
+    from orthoscope.cli.progress import bar
+    from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
+    from orthoscope.evaluate.evaluation import evaluate
+    from orthoscope.io.files import check_folder
+    from orthoscope.io.inputs import detections_from
+    from orthoscope.io.own_json import save
+    from orthoscope.methods import calibrate as run
+
+    check_folder(out)
+    with bar("detecting") as progress:
+        detections, files = detections_from(photos, target, image_size=image_size, jobs=jobs, progress=progress)
+    save(detections, out / "detections.json")
+    written = [out / "detections.json"]
+    with bar("calibrating") as progress:
+        calibration = run(detections, method=method, lens=lens, skew=skew, loss=loss)
+        evaluation = evaluate(calibration, folds=folds, progress=progress)
+    save(calibration, out / "calibration.json")
+    written.append(out / "calibration.json")
+    if report:
+        written.append(_write_report(evaluation, files, out, keep=keep))
+    if undistort:
+        written.append(_write_straight(evaluation, files, out, keep=keep, jobs=jobs))
+    if as_json:
+        click.echo(to_json(evaluation_numbers(evaluation)))
+    else:
+        click.echo("\n".join([*evaluation_lines(evaluation), "wrote      " + ", ".join(map(str, written))]))
+    return evaluation
+
+
+def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str) -> Path:
+    from orthoscope.io.undistort import before_and_after
+    from orthoscope.report.page import write_report
+
+    write_report(evaluation, out / "report.html", photograph=before_and_after(evaluation.calibration, files, keep=keep))
+    return out / "report.html"
+
+
+def _write_straight(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None) -> Path:
+    from orthoscope.cli.undistort import straighten
+    from orthoscope.geometry.arrays import InputError
+
+    if not files:
+        raise InputError(
+            "--undistort needs the photographs; these were corners found before. Use `orthoscope undistort` with the photographs."
+        )
+    calibration = evaluation.calibration
+    paths = [files[view.image] for view in calibration.detections.views]
+    straighten(paths, calibration.camera, out / "undistorted", keep=keep, jobs=jobs)
+    return out / "undistorted"

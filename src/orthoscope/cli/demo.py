@@ -1,0 +1,46 @@
+"""`orthoscope demo`: no photographs at hand, so some are rendered; then the main job, and how far its camera is from the true one.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+__all__ = ["demo"]
+
+EXAMPLE = """\b
+Example:
+  $ orthoscope demo -o demo/
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the views and the noise.")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("demo"), show_default=True, help="Folder to write."
+)
+def demo(seed: int, out: Path) -> None:
+    """Render 20 photographs of a chessboard through a distorting lens, calibrate from them, compare with the truth."""
+    import numpy as np
+
+    from orthoscope.cli.calibrate import calibrate_into
+    from orthoscope.cli.simulate import write_photographs
+    from orthoscope.evaluate.difference import frame_grid, image_difference
+    from orthoscope.evaluate.render import demo_scene
+    from orthoscope.io.files import check_folder
+    from orthoscope.io.own_json import save
+
+    check_folder(out)
+    scene = demo_scene(seed=seed)
+    folder = write_photographs(scene, out / "photographs", seed=seed)
+    save(scene.camera, out / "truth.json")
+    click.echo(f"rendered   {len(scene.camera_from_target)} photographs of {scene.target.name} into {folder}/")
+    evaluation = calibrate_into((str(folder),), target=scene.target.name, out=out, lens="brown")
+    apart = np.hypot(*image_difference(scene.camera, evaluation.calibration.camera, frame_grid(scene.camera.image_size)).T)
+    click.echo(
+        f"truth      the recovered camera is {np.nanmean(apart):.3f} px from the true one on average over the frame, "
+        f"{np.nanmax(apart):.3f} px at most"
+    )

@@ -1,0 +1,61 @@
+"""`orthoscope detect`: photographs to detections.json.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from orthoscope.cli import options
+
+__all__ = ["detect"]
+
+EXAMPLE = """\b
+Example:
+  $ orthoscope detect photos/ --target chessboard:9x6:25mm -o detections.json
+  views      13 of 14 photographs, 702 corners, 640x480
+             left03.jpg: no chessboard of 9x6 inner corners found
+  wrote      detections.json
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@options.photos
+@options.target
+@options.image_size
+@options.jobs
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path("detections.json"),
+    show_default=True,
+    help="File to write.",
+)
+@options.as_json
+def detect(photos: tuple[str, ...], target: str, image_size: tuple[int, int] | None, jobs: int | None, out: Path, as_json: bool) -> None:
+    """Find the target's corners in photographs (or turn a corners.vnl table into detections.json)."""
+    from orthoscope.cli.progress import bar
+    from orthoscope.cli.summary import to_json
+    from orthoscope.io.files import check_folder
+    from orthoscope.io.inputs import detections_from
+    from orthoscope.io.own_json import save
+
+    check_folder(out.parent)
+    with bar("detecting") as progress:
+        detections, _ = detections_from(photos, target, image_size=image_size, jobs=jobs, progress=progress)
+    save(detections, out)
+    width, height = detections.image_size
+    used, aside = detections.views, detections.set_aside
+    if as_json:
+        views = [{"name": view.image, "corners": len(view.ids)} for view in used]
+        rejected = [{"name": entry.image, "reason": entry.reason} for entry in aside]
+        click.echo(to_json({"image_size": [width, height], "corners": detections.corners, "views": views, "views_rejected": rejected}))
+        return
+    click.echo(f"views      {len(used)} of {len(used) + len(aside)} photographs, {detections.corners} corners, {width}x{height}")
+    for entry in aside:
+        click.echo(f"           {entry.image}: {entry.reason}")
+    click.echo(f"wrote      {out}")

@@ -1,0 +1,75 @@
+"""`orthoscope evaluate`: a calibration's verdict, on its own views or on others.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from orthoscope.cli import options
+
+__all__ = ["evaluate"]
+
+EXAMPLE = """\b
+Examples:
+  $ orthoscope evaluate camera/calibration.json
+  $ orthoscope evaluate camera/calibration.json --on other_photos/ --target chessboard:9x6:25mm
+  views      5 used; 270 corners
+  rms        0.201 px per point, camera fixed, poses fitted
+  NCE        0.452 (1 is what rounding to whole pixels would give)
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@options.calibration_file
+@click.option(
+    "--on", "others", multiple=True, metavar="PHOTOS", help="Photographs or corners that were not used: only their poses are fitted."
+)
+@options.target
+@options.image_size
+@options.folds
+@options.jobs
+@options.as_json
+def evaluate(
+    calibration: Path,
+    others: tuple[str, ...],
+    target: str | None,
+    image_size: tuple[int, int] | None,
+    folds: int,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
+    from orthoscope.cli.progress import bar
+    from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
+    from orthoscope.evaluate.evaluation import evaluate as judge
+    from orthoscope.evaluate.evaluation import evaluate_on
+    from orthoscope.io.inputs import detections_from
+    from orthoscope.io.own_json import load_calibration
+
+    loaded = load_calibration(calibration)
+    if not others:
+        with bar("holding out") as progress:
+            evaluation = judge(loaded, folds=folds, progress=progress)
+        click.echo(to_json(evaluation_numbers(evaluation)) if as_json else "\n".join(evaluation_lines(evaluation)))
+        return
+    with bar("detecting") as progress:
+        detections, _ = detections_from(others, target or loaded.detections.target, image_size=image_size, jobs=jobs, progress=progress)
+    test = evaluate_on(loaded.camera, detections)
+    if as_json:
+        rejected = [{"name": entry.image, "reason": entry.reason} for entry in test.detections.set_aside]
+        views = [{"name": view.image, "rms_px": rms} for view, rms in zip(test.detections.views, test.view_rms_px, strict=True)]
+        click.echo(
+            to_json(
+                {"rms_px": test.rms_px, "nce": test.nce, "corners": test.detections.corners, "views": views, "views_rejected": rejected}
+            )
+        )
+        return
+    click.echo(f"views      {len(test.detections.views)} used; {test.detections.corners} corners")
+    for entry in test.detections.set_aside:
+        click.echo(f"           {entry.image}: {entry.reason}")
+    click.echo(f"rms        {test.rms_px:.3f} px per point, camera fixed, poses fitted")
+    click.echo(f"NCE        {test.nce:.3f} (1 is what rounding to whole pixels would give)")

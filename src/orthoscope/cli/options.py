@@ -1,0 +1,90 @@
+"""Options that several verbs share, each said once.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+__all__ = [
+    "as_json",
+    "calibration_file",
+    "folds",
+    "image_size",
+    "jobs",
+    "keep",
+    "lens",
+    "loss",
+    "method",
+    "photos",
+    "skew",
+    "target",
+]
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+class _Size(click.ParamType):
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value
+        try:
+            width, height = (int(side) for side in value.lower().split("x"))
+        except ValueError:
+            self.fail(f"{value!r} is no size; expected WIDTHxHEIGHT in pixels, such as 640x480.", param, ctx)
+        if width < 1 or height < 1:
+            self.fail(f"{value!r} is no size; both sides must be at least 1.", param, ctx)
+        return width, height
+
+
+photos: Decorator = click.argument("photos", nargs=-1, required=True, metavar="PHOTOS...")
+target: Decorator = click.option(
+    "--target",
+    metavar="SPEC",
+    help="What was photographed: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g. chessboard:9x6:25mm.",
+)
+image_size: Decorator = click.option("--image-size", type=_Size(), help="Size of the photographs; needed with a corners.vnl table only.")
+lens: Decorator = click.option(
+    "--lens",
+    default="auto",
+    show_default=True,
+    metavar="NAME",
+    help="brown, rational, kannala_brandt, division, fov, pfet, fet; brown:k1,k2 frees just these; auto takes brown, or kannala_brandt for wide views.",
+)
+method: Decorator = click.option(
+    "--method",
+    default="fccm",
+    show_default=True,
+    metavar="NAME",
+    help="How to calibrate: fccm (jointly), nmldc (straight lines first) or mldc (the paper's).",
+)
+skew: Decorator = click.option("--skew", is_flag=True, help="Let the pixel axes be oblique.")
+loss: Decorator = click.option(
+    "--loss",
+    default="linear",
+    show_default=True,
+    metavar="NAME",
+    help="linear, huber or cauchy; the last two forgive gross errors beyond 1 px.",
+)
+folds: Decorator = click.option(
+    "--folds", default=5, show_default=True, type=click.IntRange(2), help="Parts that the views are held out in."
+)
+jobs: Decorator = click.option(
+    "--jobs", type=click.IntRange(1), help="Photographs read at the same time; by default as many as there are cores."
+)
+keep: Decorator = click.option(
+    "--keep",
+    type=click.Choice(["all", "valid"]),
+    default="all",
+    show_default=True,
+    help="all: every photographed pixel, with black borders; valid: only places that were photographed.",
+)
+as_json: Decorator = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
+calibration_file: Decorator = click.argument("calibration", type=click.Path(path_type=Path), metavar="CALIBRATION.json")

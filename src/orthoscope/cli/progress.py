@@ -1,0 +1,27 @@
+"""Progress bars on stderr, handed down to the floors below as plain callables.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+__all__ = ["bar"]
+
+
+@contextmanager
+def bar(title: str) -> Iterator[Callable[..., None]]:
+    """A callable (done, total, name...) that draws a bar; silent where stderr is no terminal."""
+    from tqdm import tqdm
+
+    with tqdm(desc=title, file=sys.stderr, leave=False, disable=None) as drawn:
+
+        def show(done: int, total: int, *name: str) -> None:
+            drawn.total = total
+            drawn.set_postfix_str(name[0] if name else "", refresh=False)
+            drawn.update(done - drawn.n)
+
+        yield show

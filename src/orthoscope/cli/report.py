@@ -1,0 +1,47 @@
+"""`orthoscope report`: a calibration to its page.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from orthoscope.cli import options
+
+__all__ = ["report"]
+
+EXAMPLE = """\b
+Example:
+  $ orthoscope report camera/calibration.json --photos photos/ -o report.html
+  wrote      report.html
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@options.calibration_file
+@click.option("--photos", multiple=True, metavar="PHOTOS", help="The photographs, to show one before and after.")
+@options.folds
+@options.keep
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("report.html"), show_default=True, help="File to write."
+)
+def report(calibration: Path, photos: tuple[str, ...], folds: int, keep: str, out: Path) -> None:
+    """Write the report page of a calibration: one HTML file that needs nothing else."""
+    from orthoscope.cli.progress import bar
+    from orthoscope.evaluate.evaluation import evaluate
+    from orthoscope.io.files import check_folder
+    from orthoscope.io.images import photographs
+    from orthoscope.io.own_json import load_calibration
+    from orthoscope.io.undistort import before_and_after
+    from orthoscope.report.page import write_report
+
+    loaded = load_calibration(calibration)
+    check_folder(out.parent)
+    files = {path.name: path for path in photographs(photos)} if photos else {}
+    with bar("holding out") as progress:
+        evaluation = evaluate(loaded, folds=folds, progress=progress)
+    write_report(evaluation, out, photograph=before_and_after(loaded, files, keep=keep))
+    click.echo(f"wrote      {out}")

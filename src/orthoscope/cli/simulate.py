@@ -1,0 +1,97 @@
+"""`orthoscope simulate`: a camera whose truth is known, to detections or rendered photographs.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from orthoscope.cli import options
+
+__all__ = ["simulate", "write_photographs"]
+
+EXAMPLE = """\b
+Examples:
+  $ orthoscope simulate --views 15 --noise 0.1 -o simulated/
+  wrote      simulated/detections.json, and simulated/truth.json, the camera
+  $ orthoscope simulate --camera camera/calibration.json --target chessboard:14x20:14mm --render -o simulated/
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.option(
+    "--camera",
+    "source",
+    type=click.Path(path_type=Path),
+    help="A camera.json or calibration.json; by default the camera of `orthoscope demo`.",
+)
+@click.option("--target", default="chessboard:9x6:25mm", show_default=True, metavar="SPEC", help="What stands before the camera.")
+@click.option("--views", default=20, show_default=True, type=click.IntRange(1), help="How many photographs.")
+@click.option(
+    "--noise", default=0.1, show_default=True, type=click.FloatRange(0), help="Standard deviation of each corner coordinate, pixels."
+)
+@click.option("--tilt-noise", is_flag=True, help="Let the noise grow with the target's tilt, doubling at 70 degrees (the paper's law).")
+@click.option("--tilt", default=45.0, show_default=True, type=click.FloatRange(0, 70), help="Greatest tilt of the target, degrees.")
+@click.option("--partial", is_flag=True, help="Let the target leave the frame.")
+@click.option("--render", "rendered", is_flag=True, help="Also render the photographs, into OUT/photographs.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of all that is random.")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("simulated"), show_default=True, help="Folder to write."
+)
+def simulate(
+    source: Path | None,
+    target: str,
+    views: int,
+    noise: float,
+    tilt_noise: bool,
+    tilt: float,
+    partial: bool,
+    rendered: bool,
+    seed: int,
+    out: Path,
+) -> None:
+    """Make corners, or photographs, of a camera that is known."""
+    import numpy as np
+
+    from orthoscope.evaluate.render import demo_scene
+    from orthoscope.evaluate.simulate import Scene, random_views, simulate_detections
+    from orthoscope.geometry.target import parse_target
+    from orthoscope.io.files import check_folder
+    from orthoscope.io.own_json import load_camera, save
+
+    check_folder(out)
+    rng = np.random.default_rng(seed)
+    camera, board = load_camera(source) if source else demo_scene().camera, parse_target(target)
+    poses = random_views(
+        camera, board, views, rng=rng, tilt=(0.0, np.deg2rad(tilt)), whole=not partial, margin=_square(board) if rendered else 0.0
+    )
+    scene = Scene(camera, board, poses)
+    save(simulate_detections(scene, noise_px=noise, rng=rng, tilt_noise=tilt_noise), out / "detections.json")
+    save(camera, out / "truth.json")
+    click.echo(f"wrote      {out / 'detections.json'}, and {out / 'truth.json'}, the camera")
+    if rendered:
+        folder = write_photographs(scene, out / "photographs", seed=seed)
+        click.echo(f"wrote      {views} photographs into {folder}/")
+
+
+def write_photographs(scene, folder: Path, *, seed: int) -> Path:
+    """Render every view of a scene into a folder, as PNG."""
+    import numpy as np
+
+    from orthoscope.cli.progress import bar
+    from orthoscope.evaluate.render import photographs
+    from orthoscope.io.images import write_image
+
+    with bar("rendering") as progress:
+        for done, (name, image) in enumerate(photographs(scene, rng=np.random.default_rng(seed)), 1):
+            write_image(folder / f"{name}.png", image)
+            progress(done, len(scene.camera_from_target), name)
+    return folder
+
+
+def _square(target) -> float:
+    """The side of a chessboard's square: what it reaches beyond its outer corners."""
+    return float(abs(target.points[1] - target.points[0]).max())

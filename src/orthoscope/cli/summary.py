@@ -1,0 +1,117 @@
+"""What the verbs print: an evaluation as a few lines, or as one JSON object.
+
+Floor 7.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from orthoscope.evaluate.evaluation import Evaluation
+    from orthoscope.models.camera import Camera
+
+__all__ = ["camera_numbers", "evaluation_lines", "evaluation_numbers", "to_json"]
+
+SHOWN = 6  # photographs set aside that are listed one by one
+
+
+def evaluation_lines(evaluation: Evaluation) -> list[str]:
+    """The summary: views, errors, camera with standard deviations, warnings, verdict."""
+    from orthoscope.models.lenses import lens_name
+
+    calibration = evaluation.calibration
+    detections, camera = calibration.detections, calibration.camera
+    aside = detections.set_aside
+    lines = [f"views      {len(detections.views)} used, {len(aside)} set aside; {detections.corners} corners"]
+    lines += [f"           {entry.image}: {entry.reason}" for entry in aside[:SHOWN]]
+    lines += [f"           and {len(aside) - SHOWN} more, all in detections.json"] if len(aside) > SHOWN else []
+    lines.append(
+        f"rms        {evaluation.rms_px:.3f} px per point (median {evaluation.median_px:.3f}, largest {evaluation.largest_px:.2f})"
+    )
+    if not math.isnan(evaluation.held_out_rms_px):
+        lines.append(
+            f"held out   {evaluation.held_out_rms_px:.3f} ± {evaluation.held_out_error_px:.3f} px per point, on views that were not used"
+        )
+    lines.append(f"NCE        {evaluation.nce:.3f} (1 is what rounding to whole pixels would give)")
+    deviations = calibration.uncertainty.deviations
+    values = dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.intrinsics.as_tuple(), strict=True))
+    lines.append(
+        "camera     " + "  ".join(_number(name, value, deviations) for name, value in values.items() if value or name in deviations)
+    )
+    coefficients = dict(zip(camera.lens.names(), camera.lens.coefficients, strict=True))
+    told = "  ".join(_number(name, value, deviations) for name, value in coefficients.items() if value or name in deviations)
+    lines.append(f"lens       {lens_name(camera.lens)}  {told}")
+    if camera.lens_frame:
+        centre = {"centre_x": camera.lens_frame.cx, "centre_y": camera.lens_frame.cy}
+        lines.append("           about its own centre  " + "  ".join(_number(name, value, deviations) for name, value in centre.items()))
+    lines += [f"warning    {warning}" for warning in evaluation.warnings]
+    return [*lines, f"verdict    {evaluation.verdict}"]
+
+
+def evaluation_numbers(evaluation: Evaluation) -> dict[str, Any]:
+    """The same as one object for machines; what is not known is None."""
+    calibration = evaluation.calibration
+    detections = calibration.detections
+    return {
+        "rms_px": evaluation.rms_px,
+        "median_px": evaluation.median_px,
+        "largest_px": evaluation.largest_px,
+        "held_out_rms_px": evaluation.held_out_rms_px,
+        "held_out_error_px": evaluation.held_out_error_px,
+        "nce": evaluation.nce,
+        "coverage": evaluation.coverage,
+        "corners": detections.corners,
+        "views_used": len(detections.views),
+        "views_rejected": [{"name": entry.image, "reason": entry.reason} for entry in detections.set_aside],
+        "views_suspect": [{"name": image, "reason": reason} for image, reason in evaluation.suspects],
+        "views": [
+            {"name": view.image, "corners": view.corners, "rms_px": view.rms_px, "held_out_rms_px": view.held_out_rms_px}
+            for view in evaluation.views
+        ],
+        "camera": camera_numbers(calibration.camera),
+        "deviations": calibration.uncertainty.deviations,
+        "method": calibration.method,
+        "status": calibration.status,
+        "warnings": list(evaluation.warnings),
+        "verdict": evaluation.verdict,
+    }
+
+
+def camera_numbers(camera: Camera) -> dict[str, Any]:
+    """A camera as plain numbers."""
+    from orthoscope.models.lenses import lens_name
+
+    values = dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.intrinsics.as_tuple(), strict=True))
+    coefficients = dict(zip(camera.lens.names(), map(float, camera.lens.coefficients), strict=True))
+    return {
+        "width": camera.image_size[0],
+        "height": camera.image_size[1],
+        **values,
+        "lens": {"name": lens_name(camera.lens), "coefficients": coefficients},
+        "lens_frame": camera.lens_frame and dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.lens_frame.as_tuple(), strict=True)),
+    }
+
+
+def to_json(numbers: Any) -> str:
+    """One JSON text; NaN and infinity, which JSON has no word for, become null."""
+    return json.dumps(_plain(numbers), indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def _plain(thing: Any) -> Any:
+    if isinstance(thing, dict):
+        return {key: _plain(value) for key, value in thing.items()}
+    if isinstance(thing, list | tuple):
+        return [_plain(value) for value in thing]
+    return None if isinstance(thing, float) and not math.isfinite(thing) else thing
+
+
+def _number(name: str, value: float, deviations: dict[str, float]) -> str:
+    """`fx 533.04 ± 0.61`: as many digits as the standard deviation makes meaningful."""
+    deviation = deviations.get(name)
+    if deviation is None or not math.isfinite(deviation) or deviation <= 0:
+        return f"{name} {value:.6g}"
+    places = max(0, 1 - math.floor(math.log10(deviation)))
+    return f"{name} {value:.{places}f} ± {deviation:.{places}f}"

@@ -1,0 +1,57 @@
+"""How much of the frame the corners cover, and where they do not.
+
+Floor 4.  A camera is known where corners were seen; elsewhere its lens formula only extrapolates.  Cells that no ray reaches, outside the image circle
+of a wide lens, are not missed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Bool, Int, ndarray
+from orthoscope.geometry.target import Detections
+from orthoscope.methods.calibration import Calibration
+from orthoscope.models.camera import Camera
+
+__all__ = ["COVERAGE_GRID", "cells_with_rays", "corners_by_cell", "emptiest_place", "share_covered"]
+
+COVERAGE_GRID = (8, 6)  # cells across and down by which the frame is said to be covered
+PLACES = (("at the top", "in the middle", "at the bottom"), ("left", "", "right"))
+
+
+def share_covered(calibration: Calibration) -> float:
+    """The share of the frame's cells with a corner in them, among the cells that any ray reaches."""
+    seen = corners_by_cell(calibration.detections) > 0
+    return float(seen.sum() / max((seen | cells_with_rays(calibration.camera)).sum(), 1))
+
+
+def corners_by_cell(detections: Detections, grid: tuple[int, int] = COVERAGE_GRID) -> Int[ndarray, "rows columns"]:
+    """How many corners were seen in each cell of a grid (columns, rows) over the frame."""
+    pixels = np.concatenate([view.pixels for view in detections.views])
+    x, y = _edges(detections.image_size, grid)
+    return np.histogram2d(pixels[:, 1], pixels[:, 0], bins=(y, x))[0].astype(np.int64)
+
+
+def cells_with_rays(camera: Camera, grid: tuple[int, int] = COVERAGE_GRID) -> Bool[ndarray, "rows columns"]:
+    """Which cells have a ray at their middle or at one of their corners."""
+    x, y = _edges(camera.image_size, grid)
+    at_corner = _has_ray(camera, x, y)
+    at_middle = _has_ray(camera, 0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]))
+    return at_middle | at_corner[1:, 1:] | at_corner[1:, :-1] | at_corner[:-1, 1:] | at_corner[:-1, :-1]
+
+
+def emptiest_place(detections: Detections) -> str:
+    """The ninth of the frame with the fewest corners, in words."""
+    counts = corners_by_cell(detections, (3, 3))
+    row, column = np.unravel_index(int(np.argmin(counts)), counts.shape)
+    return " ".join(word for word in (PLACES[0][row], PLACES[1][column]) if word)
+
+
+def _edges(image_size: tuple[int, int], grid: tuple[int, int]) -> tuple[ndarray, ndarray]:
+    """The cells' sides along x and along y, pixels."""
+    return np.linspace(-0.5, image_size[0] - 0.5, grid[0] + 1), np.linspace(-0.5, image_size[1] - 0.5, grid[1] + 1)
+
+
+def _has_ray(camera: Camera, x: ndarray, y: ndarray) -> ndarray:
+    pixels = np.stack(np.meshgrid(x, y), axis=-1)
+    return np.isfinite(camera.unproject(pixels.reshape(-1, 2))[:, 2]).reshape(pixels.shape[:2])

@@ -1,0 +1,126 @@
+"""Straight pictures: photographs as a pin-hole camera would have taken them.
+
+Floor 5.  The map says for each straight pixel where to look in the photograph (Camera.undistort_map); cv2.remap looks.  Where the lens has
+no image the map is NaN and the picture black.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor
+from os import PathLike
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from orthoscope.geometry.arrays import InputError, ndarray
+from orthoscope.io.images import read_image, write_image
+from orthoscope.methods.calibration import Calibration
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lenses import Brown
+
+__all__ = ["Straightener", "before_and_after", "straight_camera", "undistort", "undistort_photographs"]
+
+OUTSIDE = -10.0  # a place that is surely outside any photograph: remap paints it black
+
+
+class Straightener:
+    """A camera's straight view, its map made once for many photographs.
+
+    keep: `all` photographed pixels, or only `valid` places (no black border).  intrinsics: the pin-hole of the straight pictures.
+    """
+
+    def __init__(self, camera: Camera, *, keep: str = "all") -> None:
+        self.camera = camera
+        self.intrinsics: Intrinsics = camera.straight_intrinsics(keep)
+        self._maps = [np.nan_to_num(a, nan=OUTSIDE) for a in camera.undistort_map(self.intrinsics)]
+
+    def __call__(self, image: ndarray) -> ndarray:
+        """The straight picture of a photograph (h,w) or (h,w,c), any depth, same size.
+
+        Raises InputError where the photograph is not of the camera's size.
+        """
+        size = (image.shape[1], image.shape[0])
+        if size != tuple(self.camera.image_size):
+            width, height = self.camera.image_size
+            raise InputError(
+                f"the photograph is {size[0]}x{size[1]}; this camera was calibrated at {width}x{height}. Hand in photographs of that size."
+            )
+        return cv2.remap(image, *self._maps, interpolation=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+
+
+def undistort(image: ndarray, camera: Camera, *, keep: str = "all") -> ndarray:
+    """One straight picture; for many, a Straightener makes its map only once.
+
+    image: (h,w) or (h,w,c) of the camera's size.  keep: `all` or `valid`.
+    Raises InputError where the size differs.
+    """
+    return Straightener(camera, keep=keep)(image)
+
+
+def undistort_photographs(
+    paths: Iterable[str | PathLike[str]],
+    camera: Camera,
+    folder: str | PathLike[str],
+    *,
+    keep: str = "all",
+    executor: Executor | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> tuple[list[Path], list[tuple[str, str]]]:
+    """Straight pictures of photographs, written into a folder under their own names.
+
+    executor: where photographs are read, mapped and written (threads suit); by default here.  progress: called with (done, total, name).
+    Returns the files written, and for each photograph that could not be used its name and the reason.
+    """
+    straightener, folder = Straightener(camera, keep=keep), Path(folder)
+    photographs = [Path(path) for path in paths]
+    _check_names(photographs)
+
+    def straighten(path: Path) -> tuple[Path, str | None]:
+        try:
+            write_image(folder / path.name, straightener(read_image(path, grey=False)))
+        except InputError as error:
+            return path, str(error)
+        return folder / path.name, None
+
+    run = executor.map if executor else map
+    written, failed = [], []
+    for done, (path, failure) in enumerate(run(straighten, photographs), 1):
+        if failure is None:
+            written.append(path)
+        else:
+            failed.append((path.name, failure))
+        if progress:
+            progress(done, len(photographs), path.name)
+    return written, failed
+
+
+def _check_names(photographs: list[Path]) -> None:
+    """Raises InputError where two photographs would be written to one file."""
+    first: dict[str, Path] = {}
+    for path in photographs:
+        if path.name in first:
+            raise InputError(
+                f"{path} and {first[path.name]} have the same name; straighten them into folders of their own, one after the other."
+            )
+        first[path.name] = path
+
+
+def straight_camera(camera: Camera, *, keep: str = "all") -> Camera:
+    """The camera of the straight pictures: a pin-hole without distortion."""
+    return Camera(camera.image_size, camera.straight_intrinsics(keep), Brown())
+
+
+def before_and_after(calibration: Calibration, files: Mapping[str, Path], *, keep: str = "all") -> tuple[str, ndarray, ndarray] | None:
+    """(name, photograph, straight picture) of the view whose corners lie farthest out, where its file is at hand and can be read."""
+    views = [view for view in calibration.detections.views if view.image in files]
+    if not views:
+        return None
+    centre = 0.5 * (np.array(calibration.camera.image_size) - 1.0)
+    view = max(views, key=lambda view: float(np.hypot(*(view.pixels - centre).T).mean()))
+    try:
+        image = read_image(files[view.image], grey=False)
+        return view.image, image, undistort(image, calibration.camera, keep=keep)
+    except InputError:
+        return None
