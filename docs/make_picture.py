@@ -1,6 +1,7 @@
 """The picture in README.md, made from what `orthoscope demo` writes: `make picture`.
 
-Left a rendered photograph with the corners that were found, in the middle the same without its lens, right how far the recovered camera is from the true one.
+Left a rendered photograph with the corners that were found, in the middle the same without its lens, right how far the recovered camera
+is from the true one.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import Delaunay
+from scipy.spatial import ConvexHull
 
 from orthoscope.evaluate.simulate import Scene, random_views, simulate_detections
 from orthoscope.geometry.pose import Pose, rotation_from_vector
@@ -86,6 +86,7 @@ def worst_image(camera: Camera, other: Camera, detections: Detections, samples: 
     low, high = pixels.min(0), pixels.max(0)
     x, y = np.meshgrid(np.linspace(low[0], high[0], samples), np.linspace(low[1], high[1], samples))
     grid = np.stack([x.ravel(), y.ravel()], axis=-1)
-    covered = np.concatenate([pixels, grid[Delaunay(pixels).find_simplex(grid) >= 0]])
+    sides = ConvexHull(pixels).equations  # (sides, 3): normal pointing outwards, and offset
+    covered = np.concatenate([pixels, grid[(grid @ sides[:, :2].T + sides[:, 2] <= 0.0).all(1)]])
     covered = covered[np.isfinite(camera.unproject(covered)[:, 0])]
     return float(image_difference(camera, other, covered).max())

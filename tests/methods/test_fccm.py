@@ -181,7 +181,7 @@ def test_three_views_assume_nothing():
 def test_views_that_are_all_parallel_to_the_image_are_refused_with_any_lens(lens, noise_px):
     detections = seen(camera_with(Brown(k1=-0.25, k2=0.08)), facing(5, np.eye(3)), noise_px=noise_px)
     with pytest.raises(CalibrationError, match=r"its focal length is open .* 5 views show .*tilted by 20 to 45 degrees"):
-        fccm(detections, lens=lens)
+        fccm(detections, lens=lens, max_steps=50)  # along this valley it would walk for ever
 
 
 @pytest.mark.parametrize("views", [1, 2, 3, 8])
@@ -190,7 +190,7 @@ def test_views_that_are_all_parallel_to_the_image_are_refused_with_any_lens(lens
 def test_so_they_are_with_any_number_of_views(views, noise_px, seed):
     detections = seen(NARROW, facing(views, np.eye(3), seed=seed), noise_px=noise_px, seed=seed)
     with pytest.raises(CalibrationError, match="its focal length is open") as refusal:
-        fccm(detections, lens="brown:k1,k2")
+        fccm(detections, lens="brown:k1,k2", max_steps=50)
     if noise_px == 0.0 or views > 3:  # noise in few views tilts them by some degrees
         assert "parallel to one plane, and then distance and focal length cannot be told apart" in str(refusal.value)
 

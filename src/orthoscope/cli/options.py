@@ -56,7 +56,8 @@ lens: Decorator = click.option(
     default="auto",
     show_default=True,
     metavar="NAME",
-    help="brown, rational, kannala_brandt, division, fov, pfet, fet; brown:k1,k2 frees just these; auto takes brown, or kannala_brandt for wide views.",
+    help="brown, rational, kannala_brandt, division, fov, pfet, fet; brown:k1,k2 frees just these; "
+    "auto takes brown, or kannala_brandt for wide views.",
 )
 method: Decorator = click.option(
     "--method",

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import click
 
-from orthoscope.cli import options
-
 __all__ = ["simulate", "write_photographs"]
 
 EXAMPLE = """\b

@@ -1,7 +1,7 @@
 """How much of the frame the corners cover, and where they do not.
 
-Floor 4.  A camera is known where corners were seen; elsewhere its lens formula only extrapolates.  Cells that no ray reaches, outside the image circle
-of a wide lens, are not missed.
+Floor 4.  A camera is known where corners were seen; elsewhere its lens formula only extrapolates.  Cells that no ray reaches, outside
+the image circle of a wide lens, are not missed.
 """
 
 from __future__ import annotations

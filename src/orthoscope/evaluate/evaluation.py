@@ -1,6 +1,7 @@
 """How good a calibration is: its numbers, and the sentences that verdict.py makes of them.
 
-Floor 4.  The error that counts is that of photographs which were held out; rms, NCE, coverage and the views that do not belong stand beside it.
+Floor 4.  The error that counts is that of photographs which were held out; rms, NCE, coverage and the views that do not belong stand
+beside it.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ __all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on"]
 class Evaluation:
     """What `evaluate` finds out about a calibration.
 
-    rms_px, median_px, largest_px: of |residual| over the corners it was made from.  held_out_rms_px: over all corners, each from a fold that
-    did not use its photograph; held_out_error_px: its standard error over views; NaN where there were too few views.  nce: of held-out
-    views where there are any, else of the training views.  coverage: share of the frame's cells where corners were seen (coverage.py).
-    suspects: views and why they do not belong.  warnings: sentences.  verdict: one sentence.  held_out_residuals: one array (n,2) for each
-    view, NaN where not done.
+    rms_px, median_px, largest_px: of |residual| over the corners it was made from.  held_out_rms_px: over all corners, each from a fold
+    that did not use its photograph; held_out_error_px: its standard error over views; NaN where there were too few views.  nce: of
+    held-out views where there are any, else of the training views.  coverage: share of the frame's cells where corners were seen
+    (coverage.py). suspects: views and why they do not belong.  warnings: sentences.  verdict: one sentence.  held_out_residuals: one
+    array (n,2) for each view, NaN where not done.
     """
 
     calibration: Calibration

@@ -36,8 +36,8 @@ def normalised_calibration_error(estimated: Float[ndarray, "n 3"], observed: Flo
 def lateral_errors(camera: Camera, camera_from_target: Sequence[Pose], detections: Detections) -> tuple[ndarray, ndarray]:
     """Points as back-projected from the detected pixels and as the poses place them (n,3 each), for NCE.
 
-    Corners that no straight image would hold (WIDEST), or whose pixel no ray reaches, are left out: towards 90 degrees a lateral error grows
-    without end.
+    Corners that no straight image would hold (WIDEST), or whose pixel no ray reaches, are left out: towards 90 degrees a lateral error
+    grows without end.
     """
     points = detections.target.points
     observed = np.concatenate([pose.apply(points[view.ids]) for pose, view in zip(camera_from_target, detections.views, strict=True)])

@@ -1,6 +1,7 @@
 """The verdict in plain words: what stands against trusting a calibration, and what to do about it.
 
-Floor 4.  Sentences are made of findings, each with its number; the thresholds that turn a number into a sentence stand here and nowhere else.
+Floor 4.  Sentences are made of findings, each with its number; the thresholds that turn a number into a sentence stand here and nowhere
+else.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class ViewError:
 
 
 class Findings(NamedTuple):
-    """What was found out: held-out errors, share of the frame covered, views that do not belong with the reason, corners beyond the domain."""
+    """What was found out: held-out errors, share of the frame covered, views that do not belong and why, corners beyond the domain."""
 
     calibration: Calibration
     unseen: HeldOut
@@ -72,8 +73,9 @@ def warnings_about(found: Findings) -> tuple[str, ...]:
         told.append(f"the solver {calibration.status}")
     if found.beyond:
         told.append(
-            f"the lens formula folds over at {np.degrees(calibration.camera.lens.field_angle):.1f} degrees from the axis, before {found.beyond} of "
-            f"{detections.corners} corners: it does not suit this lens there. Try another: --lens brown, rational or kannala_brandt"
+            f"the lens formula folds over at {np.degrees(calibration.camera.lens.field_angle):.1f} degrees from the axis, "
+            f"before {found.beyond} of {detections.corners} corners: "
+            "it does not suit this lens there. Try another: --lens brown, rational or kannala_brandt"
         )
     if views < FEW_VIEWS:
         told.append(f"only {views} view{'s' if views > 1 else ''}; 15 or more, tilted in different directions, make the camera certain")

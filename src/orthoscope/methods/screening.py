@@ -6,12 +6,14 @@ and it must not be seen edge-on, where all pixels are on a line too.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
-from orthoscope.geometry.target import Detections, SetAside, Target, View
+from orthoscope.geometry.target import Detections, SetAside, View
 
 __all__ = ["screened"]
 
@@ -27,9 +29,12 @@ def screened(detections: Detections) -> Detections:
     kept: list[View] = []
     aside: list[SetAside] = list(detections.set_aside)
     seen: dict[bytes, str] = {}
+    off_a_line = cache(
+        lambda ids: _off_a_line(detections.target.points[np.frombuffer(ids, np.int64), :2])
+    )  # most boards are whole, and alike
     for view in detections.views:
         content = view.ids.tobytes() + view.pixels.tobytes()
-        if reason := _fault(view, detections.target):
+        if reason := _fault(view, off_a_line):
             aside.append(SetAside(view.image, reason))
         elif content in seen:
             aside.append(SetAside(view.image, f"the same corners as {seen[content]}"))
@@ -45,11 +50,11 @@ def screened(detections: Detections) -> Detections:
     return replace(detections, views=tuple(kept), set_aside=tuple(aside))
 
 
-def _fault(view: View, target: Target) -> str | None:
-    """Why a view tells nothing; None where it does."""
+def _fault(view: View, off_a_line: Callable[[bytes], int]) -> str | None:
+    """Why a view tells nothing; None where it does.  off_a_line: of the ids of its corners."""
     if len(view.ids) < FEWEST:
         return f"{len(view.ids)} corners; a view needs {FEWEST}"
-    off = _off_a_line(target.points[view.ids, :2])
+    off = off_a_line(view.ids.tobytes())
     if off < 2:
         return f"all its corners{' but one' if off else ''} are on one line of the target"
     if _thin(view.pixels):

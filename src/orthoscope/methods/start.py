@@ -136,9 +136,10 @@ def starts(bases: Bases, lens: type[Lens], *, coefficients: Sequence[str] | None
     Raises CalibrationError where the corners fit no camera, or lie where the wanted lens cannot see.
     """
     coefficients = lens.free if coefficients is None else coefficients
-    likely = [bases.pinhole] if lens.chart is GNOMONIC and bases.pinhole_fits else [bases.angle, bases.pinhole]
+    if lens.chart is GNOMONIC and bases.pinhole is not None and bases.pinhole_fits:
+        return _with_lens(bases, bases.pinhole, lens, coefficients)
     found: list[Estimate] = []
-    for base in sorted((base for base in likely if base is not None), key=bases.misfit):
+    for base in sorted((base for base in (bases.angle, bases.pinhole) if base is not None), key=bases.misfit):
         try:
             found += _with_lens(bases, base, lens, coefficients)
         except CalibrationError:
