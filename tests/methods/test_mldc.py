@@ -178,18 +178,15 @@ def test_with_distortion_no_member_is_the_camera_even_without_noise():
     assert evaluate_on(nmldc(training, lens="brown:k1").camera, test).nce < 1e-6
 
 
-def test_the_nce_of_fccm_in_the_papers_simulation_is_as_known():
-    """A prototype had 0.119 low and 0.786 high with k1 k2, 0.033 and 0.016 with 5 parameters; views differ, so this is the spread."""
-    expected = {
-        ("low", "brown:k1,k2"): (0.05, 0.13),
-        ("high", "brown:k1,k2"): (0.3, 0.9),
-        ("low", "brown"): (0.004, 0.035),
-        ("high", "brown"): (0.01, 0.04),
-    }
-    for (distortion, lens), (least, most) in expected.items():
-        for seed in range(3):
-            training, test = papers_simulation(distortion, seed=seed)
-            assert least < evaluate_on(fccm(training, lens=lens).camera, test).nce < most
+@pytest.mark.parametrize(("distortion", "known"), [("low", 0.119), ("high", 0.786)])
+def test_the_nce_of_fccm_in_the_papers_simulation_is_as_known(distortion, known):
+    """A prototype's figure for k1 k2 about the principal point, from one set of views, lies within the spread over sets of views."""
+    errors = []
+    for seed in range(6):
+        training, test = papers_simulation(distortion, seed=seed)
+        errors.append(evaluate_on(fccm(training, lens="brown:k1,k2").camera, test).nce)
+        assert evaluate_on(fccm(training, lens="brown").camera, test).nce < 0.05  # with 5 parameters the lens is met: only noise is left
+    assert abs(np.mean(errors) - known) < 2.0 * np.std(errors, ddof=1)
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 """The command line: each verb one arrow of the flow, in a file of its own.
 
-Floor 7, the only one that prints.  Numbers go to stdout, progress and remarks to stderr.  Exit 0: done; 1: the data cannot answer; 2: the
+Floor 8, the only one that prints.  Numbers go to stdout, progress and remarks to stderr.  Exit 0: done; 1: the data cannot answer; 2: the
 command or what it was given is wrong.  Nothing but click is imported here and at the head of a verb, so that `--help` is instant.
 """
 
@@ -15,6 +15,7 @@ from orthoscope.cli.demo import demo
 from orthoscope.cli.detect import detect
 from orthoscope.cli.evaluate import evaluate
 from orthoscope.cli.export import export
+from orthoscope.cli.paper import paper
 from orthoscope.cli.report import report
 from orthoscope.cli.simulate import simulate
 from orthoscope.cli.undistort import undistort
@@ -34,7 +35,7 @@ def verbs() -> None:
     """Photographs of a flat target in, a camera that can be trusted out."""
 
 
-for verb in (calibrate, detect, evaluate, undistort, export, report, simulate, demo):
+for verb in (calibrate, detect, evaluate, undistort, export, report, simulate, demo, paper):
     verbs.add_command(verb)
 
 

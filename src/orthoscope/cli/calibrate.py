@@ -1,6 +1,6 @@
 """`orthoscope calibrate`: photographs, or corners found before, to a camera with its report.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """`orthoscope demo`: no photographs at hand, so some are rendered; then the main job, and how far its camera is from the true one.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """`orthoscope detect`: photographs to detections.json.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """`orthoscope evaluate`: a calibration's verdict, on its own views or on others.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """`orthoscope export`: a camera to the file of the tool that is used next.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

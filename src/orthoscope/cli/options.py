@@ -1,6 +1,6 @@
 """Options that several verbs share, each said once.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Progress bars on stderr, handed down to the floors below as plain callables.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

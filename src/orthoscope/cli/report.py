@@ -1,6 +1,6 @@
 """`orthoscope report`: a calibration to its page.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """`orthoscope simulate`: a camera whose truth is known, to detections or rendered photographs.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What the verbs print: an evaluation as a few lines, or as one JSON object.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

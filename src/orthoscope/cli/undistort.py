@@ -1,6 +1,6 @@
 """`orthoscope undistort`: photographs to straight pictures.
 
-Floor 7.
+Floor 8.
 """
 
 from __future__ import annotations

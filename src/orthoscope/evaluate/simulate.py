@@ -31,6 +31,8 @@ LEAST_SEEN = 0.25  # share of the corners that a partial view shows at least
 DOUBLED_AT = np.deg2rad(70.0)  # the paper's section 4.1: at this tilt the noise is twice what it is face on
 PLASTIC = 1.324717957244746  # its powers make the most even sequence in the plane (M. Roberts, R2, 2018)
 
+PAPER_FILL = (0.8, 0.98)  # its Fig. 1 shows boards that fill the frame; what a lens formula cannot follow shows at the frame's border
+
 PAPER_LENSES: dict[str, tuple[Brown, tuple[float, float]]] = {
     "low": (Brown(k1=-0.2), (317.0, 244.0)),
     "high": (Brown(k1=-0.3, k2=-0.045, p1=-0.005, p2=-0.00025), (305.0, 257.0)),
@@ -104,7 +106,7 @@ def paper_scene(distortion: str, *, count: int = 20, rng: np.random.Generator) -
     lens, (centre_x, centre_y) = PAPER_LENSES[distortion]
     camera = Camera((640, 480), Intrinsics(750.0, 750.0, 320.0, 240.0), lens, lens_frame=Intrinsics(750.0, 750.0, centre_x, centre_y))
     target = chessboard(14, 20, 0.014)
-    return Scene(camera, target, random_views(camera, target, count, rng=rng))
+    return Scene(camera, target, random_views(camera, target, count, rng=rng, fill=PAPER_FILL))
 
 
 def random_views(

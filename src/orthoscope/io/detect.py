@@ -1,7 +1,7 @@
 """Photographs to Detections: each is read, looked at and refined on its own, many at the same time.
 
-Floor 5.  A photograph that cannot take part is set aside with the reason, and the others go on: one that cannot be read, one of another size than most,
-one that shows the same picture as another, one without the target.
+Floor 5.  A photograph that cannot take part is set aside with the reason, and the others go on: one that cannot be read, one of another
+size than most, one that shows the same picture as another, one without the target.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ import numpy as np
 
 from orthoscope.geometry.arrays import CalibrationError, InputError, ndarray
 from orthoscope.geometry.target import Detections, SetAside, Target, View, parse_target
-from orthoscope.io.chessboard import find_chessboard, locate_chessboard
+from orthoscope.io.chessboard import board_size, find_chessboard
 from orthoscope.io.images import names_of, photographs, read_image
 
 __all__ = ["DETECTORS", "detect"]
 
 Detector = Callable[[ndarray, Target], tuple[ndarray, ndarray] | None]
-GUESSES = 3  # photographs that are searched for boards of other sizes where none showed the target
-OTHER_BOARDS = ((9, 6), (8, 6), (7, 6), (8, 5), (7, 5), (6, 5), (7, 7), (6, 4), (5, 4), (10, 7), (11, 8), (12, 9), (13, 9), (14, 9), (4, 3))
+LISTED = 5  # photographs whose reasons are told where none showed the target
+GUESSES = 3  # photographs that are then searched for boards of other sizes
+USUAL_BOARDS = ((9, 6), (8, 6), (7, 6), (8, 5), (7, 5), (6, 5), (7, 7), (6, 4), (5, 4), (10, 7), (11, 8), (12, 9), (13, 9), (14, 9), (4, 3))
 
 
 class _Look(NamedTuple):
@@ -49,8 +50,8 @@ def detect(
 ) -> Detections:
     """Find the target in photographs.
 
-    paths: files, folders and globs.  target: or its description, such as `chessboard:9x6:25mm`.  jobs: photographs looked at at once (as many as there
-    are cores), or an executor of one's own.  progress: called with (done, total, name).
+    paths: files, folders and globs.  target: or its description, such as `chessboard:9x6:25mm`.  jobs: photographs looked at at once
+    (as many as there are cores), or an executor of one's own.  progress: called with (done, total, name).
     Raises InputError where paths or target are wrong, CalibrationError where no photograph shows the target.
     """
     target = parse_target(target) if isinstance(target, str) else target
@@ -130,24 +131,27 @@ def _sorted_out(names: list[str], looks: list[_Look], size: tuple[int, int] | No
 def _nothing_found(files: list[Path], names: list[str], looks: list[_Look], target: Target, aside: list[SetAside]) -> str:
     """Why no photograph could be used, and which board seems to be there instead."""
     readable = [file for file, look in zip(files, looks, strict=True) if look.size]
-    told = f"{target.name} was found in none of {len(files)} photographs"
-    for file in readable[:GUESSES]:
-        if board := _other_board(read_image(file, grey=True), target):
-            columns, rows = board
-            return (
-                f"{told}; expected it in most of them. In {file.name} there seems to be a board of {columns}x{rows} inner corners: if that is the "
-                f"one, say --target chessboard:{columns}x{rows}:{target.name.rpartition(':')[2]}."
-            )
-    reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:5])
-    return f"{told}; expected it whole, sharp and lit in most of them. Count its inner corners (one fewer than squares, each way) and look at them:{reasons}"
+    reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:LISTED])
+    if more := len(aside) - LISTED:
+        reasons += f"\n  and {more} more" if more > 0 else ""
+    if not readable:
+        return f"none of {len(files)} photographs can be read; expected images. Look at them:{reasons}"
+    told = f"{target.name} was found in none of {len(readable)} photographs; expected it in most of them."
+    if board := _board_instead(readable, target):
+        columns, rows = board
+        return (
+            f"{told} There seems to be a board of {columns}x{rows} inner corners in {readable[0].name if len(readable) == 1 else 'them'}: "
+            f"if that is the one, say --target chessboard:{columns}x{rows}:{target.name.rpartition(':')[2]}."
+        )
+    return f"{told} Count its inner corners (one fewer than squares, each way), and see that it is whole, sharp and lit:{reasons}"
 
 
-def _other_board(grey: ndarray, target: Target) -> tuple[int, int] | None:
-    """The largest board of another size that is found in a photograph: squares counted instead of corners first, then usual ones."""
+def _board_instead(files: list[Path], target: Target) -> tuple[int, int] | None:
+    """The size of the board that most of a few photographs show, where it is not the target's."""
     columns, rows = target.grid or (0, 0)
     near = [(columns + i, rows + j) for i, j in ((-1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1), (-2, -2))]
-    boards = [board for board in dict.fromkeys([*near, *OTHER_BOARDS]) if min(board) >= 3 and set(board) != {columns, rows}]
-    for board in boards:
-        if locate_chessboard(grey, *board) is not None:
-            return board
-    return None
+    guesses = [board for board in dict.fromkeys([*near, *USUAL_BOARDS]) if min(board) >= 3]
+    few = files[:: max(1, len(files) // GUESSES)][:GUESSES]
+    seen = Counter(board for file in few if (board := board_size(read_image(file, grey=True), guesses)))
+    others = {board: count for board, count in seen.items() if sorted(board) != sorted((columns, rows))}
+    return max(others, key=lambda board: others[board], default=None)

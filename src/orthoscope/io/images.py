@@ -1,15 +1,17 @@
 """Photographs: which files they are, read upright as 8-bit pictures, and written as wholes.
 
-Floor 5.  OpenCV reads; it turns pictures upright by their EXIF tag, but says nothing of a file that is cut off (a JPEG comes back half grey), so
-the end that each format must have is looked for first.  16-bit pictures are brought to 8 bits by their own brightest value: cameras
-fill 10, 12 or 14 bits of the 16, and a fixed divisor would turn those nearly black.
+Floor 5.  OpenCV decodes; it turns pictures upright by their EXIF tag, but before version 5 says nothing of a JPEG that is cut off (it comes
+back half grey), so the end that JPEG and PNG must have is looked for first, chunk by chunk: thumbnails have ends of their own, and
+telephones put whole films after the picture.  16-bit pictures are brought to 8 bits by the fewest bits that hold their brightest value:
+cameras fill 10, 12 or 14 bits of the 16, and dividing by 257 would turn those nearly black.
 """
 
 from __future__ import annotations
 
 import glob
 import re
-from collections.abc import Iterable
+import threading
+from collections.abc import Callable, Iterable, Iterator
 from os import PathLike
 from pathlib import Path
 
@@ -22,8 +24,8 @@ from orthoscope.io.files import read_bytes, write_bytes
 __all__ = ["SUFFIXES", "names_of", "photographs", "read_image", "write_image"]
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
-ENDS = {b"\x89PNG": b"IEND", b"\xff\xd8\xff": b"\xff\xd9"}  # how a format begins, and what a whole file has near its end
-TAIL = 4096  # bytes: some cameras put a few after the end
+JPEG, PNG = b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"  # how they begin
+MARKER = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")  # of a JPEG's segment; FF 00 and restarts are part of the coded picture
 
 Path_ = str | PathLike[str]
 
@@ -36,8 +38,11 @@ def photographs(paths: Path_ | Iterable[Path_]) -> list[Path]:
     given = [paths] if isinstance(paths, str | PathLike) else list(paths)
     if not given:
         raise InputError("no photographs were named; expected files, folders or globs, such as photos/ or photos/*.png.")
-    found = [file for path in given for file in _expanded(Path(path))]
-    return list(dict.fromkeys(found))
+    found: dict[Path, Path] = {}
+    for path in given:
+        for file in _expanded(Path(path)):
+            found.setdefault(file.resolve(), file)
+    return list(found.values())
 
 
 def names_of(files: Iterable[Path]) -> list[str]:
@@ -58,16 +63,16 @@ def read_image(path: Path_, *, grey: bool) -> ndarray:
     content = read_bytes(Path(path))
     if not content:
         raise InputError(f"{path} is empty; expected a photograph. Copy it again or leave it out.")
-    for start, end in ENDS.items():
-        if content.startswith(start) and end not in content[-TAIL:]:
-            raise InputError(
-                f"{path} is cut off ({len(content)} bytes without an end); expected a whole photograph. Copy it again or leave it out."
-            )
+    if not _is_whole(content):
+        raise InputError(
+            f"{path} is cut off ({len(content)} bytes without an end); expected a whole photograph. Copy it again or leave it out."
+        )
     flags = (cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) | cv2.IMREAD_ANYDEPTH
-    try:
-        image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
-    except cv2.error:
-        image = None
+    with _QUIET:
+        try:
+            image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
+        except cv2.error:
+            image = None
     if image is None:
         raise InputError(f"{path} is not an image that can be read; expected one of {', '.join(SUFFIXES)}. Convert it or leave it out.")
     return _to_8_bits(image)
@@ -80,10 +85,11 @@ def write_image(path: Path_, image: ndarray) -> None:
     """
     suffix = Path(path).suffix.lower()
     options = [cv2.IMWRITE_JPEG_QUALITY, 95] if suffix in (".jpg", ".jpeg") else []
-    try:
-        done, content = cv2.imencode(suffix, image, options)
-    except cv2.error:
-        done, content = False, None
+    with _QUIET:
+        try:
+            done, content = cv2.imencode(suffix, image, options)
+        except cv2.error:
+            done, content = False, None
     if not done or content is None:
         raise InputError(
             f"{path} cannot be written: {suffix or 'no suffix'} is no image format known here; expected one of {', '.join(SUFFIXES)}."
@@ -94,7 +100,7 @@ def write_image(path: Path_, image: ndarray) -> None:
 def _expanded(path: Path) -> list[Path]:
     """The files that one path means."""
     if path.is_dir():
-        files = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith(".")]
+        files = [file for file in path.iterdir() if _is_photograph(file)]
         if not files:
             raise InputError(
                 f"folder {path} holds no photograph; expected files ending in {', '.join(SUFFIXES)}. Name the folder that has them."
@@ -102,19 +108,77 @@ def _expanded(path: Path) -> list[Path]:
         return sorted(files, key=_natural)
     if path.exists():
         return [path]
-    files = [Path(name) for name in glob.glob(str(path))]
+    files = [file for name in glob.glob(str(path), recursive=True) if _is_photograph(file := Path(name))]
     if not files:
         raise InputError(f"{path} does not exist; expected a photograph, a folder of photographs or a glob that matches some.")
     return sorted(files, key=_natural)
 
 
+def _is_photograph(file: Path) -> bool:
+    """By its name; a file that is named itself is believed to be one."""
+    return file.suffix.lower() in SUFFIXES and not file.name.startswith(".") and file.is_file()
+
+
 def _natural(path: Path) -> list[tuple[int, int, str]]:
     """A sort key in which numbers count as numbers."""
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part.lower()) for part in re.split(r"(\d+)", path.name) if part]
+    return [(0, int(part), "") if part.isdecimal() else (1, 0, part.lower()) for part in re.split(r"(\d+)", str(path)) if part]
+
+
+def _is_whole(content: bytes) -> bool:
+    """Whether a JPEG or a PNG has its end; other formats are left to their decoder, which notices."""
+    if content.startswith(JPEG):
+        return b"\xd9" in _jpeg_segments(content)
+    if content.startswith(PNG):
+        return b"IEND" in _png_chunks(content)
+    return True
+
+
+def _jpeg_segments(content: bytes) -> Iterator[bytes]:
+    """The codes of a JPEG's markers up to its end or the file's; what lies between coded pictures is skipped by its length."""
+    place = 2
+    while found := MARKER.search(content, place):
+        yield (code := found[0][1:])
+        place = found.end() + (0 if code == b"\x01" else int.from_bytes(content[found.end() : found.end() + 2], "big"))
+
+
+def _png_chunks(content: bytes) -> Iterator[bytes]:
+    """The names of a PNG's chunks that are there whole."""
+    place = len(PNG)
+    while (end := place + 12 + int.from_bytes(content[place : place + 4], "big")) <= len(content):
+        yield content[place + 4 : place + 8]
+        place = end
 
 
 def _to_8_bits(image: ndarray) -> ndarray:
+    """uint8 as it is; whole numbers by the fewest bits that hold the brightest, others by the brightest itself."""
     if image.dtype == np.uint8:
         return image
-    brightest = float(np.nanmax(image)) if image.size else 0.0
-    return np.clip(image * (255.0 / max(brightest, 1e-12)) + 0.5, 0, 255).astype(np.uint8)
+    brightest = float(np.nanmax(image, initial=0.0))
+    if np.issubdtype(image.dtype, np.integer):
+        brightest = float(2 ** max(8, int(brightest).bit_length()) - 1)
+    scaled = np.nan_to_num(image.astype(np.float32)) * np.float32(255.0 / max(brightest, 1e-12))
+    return np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
+
+
+class _Quiet:
+    """OpenCV keeps its remarks to itself while any thread is inside."""
+
+    def __init__(self) -> None:
+        self.lock, self.inside, self.level = threading.Lock(), 0, 0
+        # the place of these two differs between versions of OpenCV, and neither is known to type checkers in both
+        self.set_level: Callable[[int], int] = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel  # pyright: ignore
+
+    def __enter__(self) -> None:
+        with self.lock:
+            if self.inside == 0:
+                self.level = self.set_level(0)
+            self.inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self.lock:
+            self.inside -= 1
+            if self.inside == 0:
+                self.set_level(self.level)
+
+
+_QUIET = _Quiet()

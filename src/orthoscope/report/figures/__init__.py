@@ -1,6 +1,7 @@
 """The report's figures: data in, Figure out.
 
-Floor 6.  The only place with matplotlib; importing this package loads it, so import it where a figure is needed.
+Floor 6.  With experiments/figures.py the only place with matplotlib; importing this package loads it, so import it where a figure is
+needed.
 """
 
 from orthoscope.report.figures.coverage import coverage

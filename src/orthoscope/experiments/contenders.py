@@ -1,0 +1,49 @@
+"""Who is compared: the paper's three, and the peers that get a fair chance.
+
+Floor 7.  The paper's FCCM has k1 and k2 about the principal point, although the simulated lens has tangential terms and a centre of its
+own; its NMLDC and MLDC have `pfet` about a centre of their own.  Fair chances are FCCM with 5 parameters, every other method of METHODS
+as it comes, and, in a table, every method with every lens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from orthoscope.methods import METHODS
+from orthoscope.models.lenses import LENSES
+
+__all__ = ["FCCM", "FCCM5", "MLDC", "NMLDC", "PAPER", "Contender", "every_lens", "fair_peers", "with_skew"]
+
+FCCM, NMLDC, MLDC, FCCM5 = "FCCM", "NMLDC", "MLDC", "FCCM 5 parameters"
+
+
+class Contender(NamedTuple):
+    """A method with its settings, under the name that figures and tables give it."""
+
+    name: str
+    method: str
+    settings: Mapping[str, Any]
+
+
+PAPER = (
+    Contender(FCCM, "fccm", {"lens": "brown:k1,k2"}),
+    Contender(NMLDC, "nmldc", {"lens": "pfet"}),
+    Contender(MLDC, "mldc", {"lens": "pfet"}),
+)
+
+
+def fair_peers() -> tuple[Contender, ...]:
+    """FCCM with k1, k2, p1, p2 and k3; and methods that the paper does not know."""
+    others = sorted(set(METHODS) - {contender.method for contender in PAPER})
+    return (Contender(FCCM5, "fccm", {"lens": "brown"}), *(Contender(name, name, {}) for name in others))
+
+
+def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[Contender, ...]:
+    """Every method with every lens, the coefficients free that a user gets by naming it."""
+    return tuple(Contender(f"{method} {lens}", method, {"lens": lens}) for method in METHODS for lens in lenses)
+
+
+def with_skew(contenders: tuple[Contender, ...]) -> tuple[Contender, ...]:
+    """The same, with oblique pixel axes allowed, as in the paper's Table 1."""
+    return tuple(contender._replace(settings={**contender.settings, "skew": True}) for contender in contenders)
