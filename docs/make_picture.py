@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import orthoscope
-from orthoscope.evaluate.difference import frame_grid
+from orthoscope.evaluation.difference import frame_grid
 from orthoscope.io.undistort import Straightener
 
 COLUMNS, ROWS = 81, 61
@@ -37,8 +37,8 @@ def picture(demo: Path) -> Figure:
         axes.set(title=title, xticks=[], yticks=[])
     apart = np.hypot(*orthoscope.image_difference(truth, camera, frame_grid(camera.image_size, COLUMNS, ROWS)).T).reshape(ROWS, COLUMNS)
     drawn = right.imshow(apart, extent=(-0.5, camera.image_size[0] - 0.5, camera.image_size[1] - 0.5, -0.5), cmap="viridis", vmin=0)
-    right.set(title=f"recovered camera against the true one: {np.nanmean(apart):.3f} px on average", xticks=[], yticks=[])
-    figure.colorbar(drawn, ax=right, label="px", shrink=0.9)
+    right.set(title=f"off the true camera by {np.nanmean(apart):.3f} px on average", xticks=[], yticks=[])
+    figure.colorbar(drawn, ax=right, label="px", shrink=0.8)
     return figure
 
 

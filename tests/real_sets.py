@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from orthoscope.geometry.target import Detections, Target, View, chessboard
-from orthoscope.io.images import photographs, read_image
+from orthoscope.geometry.target import Detections, Target, View
 
-__all__ = ["CLASSIC", "babel_cube", "classic", "photographs_of", "zhang"]
+__all__ = ["CLASSIC", "babel_cube", "classic", "zhang"]
 
 CLASSIC = {  # name: file of corners in the folder of photographs
     "opencv-left": "opencv-left/corners.npz",
@@ -65,17 +64,3 @@ def _detections(target: Target, table, ids: np.ndarray) -> Detections:
 def _image_size(table) -> tuple[int, int]:
     width, height = table["image_size"]
     return int(width), int(height)
-
-
-def photographs_of(pattern: Path, columns: int, rows: int, detectors) -> tuple[Detections, list[Detections]]:
-    """What each detector (grey, columns, rows) finds in the photographs of the usual size: that of the first, and of the others."""
-    pictures = {path.name: read_image(path, grey=True) for path in photographs(pattern)}
-    height, width = max(shapes := [picture.shape for picture in pictures.values()], key=shapes.count)
-    pictures = {name: picture for name, picture in pictures.items() if picture.shape == (height, width)}
-    target = chessboard(columns, rows, 0.03)
-    found = []
-    for detector in detectors:
-        corners = {name: detector(picture, columns, rows) for name, picture in pictures.items()}
-        views = [View(name, np.arange(columns * rows), np.asarray(c, dtype=float)) for name, c in corners.items() if c is not None]
-        found.append(Detections(target, (width, height), tuple(views)))
-    return found[0], found[1:]

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 from orthoscope.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from orthoscope.evaluate.difference import image_difference as image_difference
-    from orthoscope.evaluate.evaluation import Evaluation as Evaluation
-    from orthoscope.evaluate.evaluation import evaluate as evaluate
-    from orthoscope.evaluate.metrics import normalised_calibration_error as normalised_calibration_error
-    from orthoscope.evaluate.render import render as render
-    from orthoscope.evaluate.simulate import Scene as Scene
-    from orthoscope.evaluate.simulate import simulate_detections as simulate_detections
+    from orthoscope.evaluation.difference import image_difference as image_difference
+    from orthoscope.evaluation.evaluate import Evaluation as Evaluation
+    from orthoscope.evaluation.evaluate import evaluate as evaluate
+    from orthoscope.evaluation.metrics import normalised_calibration_error as normalised_calibration_error
+    from orthoscope.evaluation.render import render as render
+    from orthoscope.evaluation.simulate import Scene as Scene
+    from orthoscope.evaluation.simulate import simulate_detections as simulate_detections
     from orthoscope.geometry.arrays import CalibrationError as CalibrationError
     from orthoscope.geometry.arrays import InputError as InputError
     from orthoscope.geometry.pose import Pose as Pose
@@ -49,11 +49,11 @@ if TYPE_CHECKING:
     from orthoscope.report.page import write_report as write_report
 
 ROOMS = {
-    "evaluate.difference": ("image_difference",),
-    "evaluate.evaluation": ("Evaluation", "evaluate"),
-    "evaluate.metrics": ("normalised_calibration_error",),
-    "evaluate.render": ("render",),
-    "evaluate.simulate": ("Scene", "simulate_detections"),
+    "evaluation.difference": ("image_difference",),
+    "evaluation.evaluate": ("Evaluation", "evaluate"),
+    "evaluation.metrics": ("normalised_calibration_error",),
+    "evaluation.render": ("render",),
+    "evaluation.simulate": ("Scene", "simulate_detections"),
     "geometry.arrays": ("CalibrationError", "InputError"),
     "geometry.pose": ("Pose",),
     "geometry.target": ("Detections", "Target", "View", "chessboard", "parse_target"),

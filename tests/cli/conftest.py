@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from orthoscope.cli import main
-from orthoscope.evaluate.render import Renderer, photographs
-from orthoscope.evaluate.simulate import Scene, random_views
+from orthoscope.evaluation.render import Renderer, photographs
+from orthoscope.evaluation.simulate import Scene, random_views
 from orthoscope.geometry.target import chessboard
 from orthoscope.io.images import write_image
 from orthoscope.models.camera import Camera, Intrinsics

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 
-from orthoscope.evaluate.simulate import Scene, simulate_detections
+from orthoscope.evaluation.simulate import Scene, simulate_detections
 from orthoscope.geometry.pose import Pose
 from orthoscope.io.own_json import load_detections, save
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orthoscope.cli import verbs
-from orthoscope.evaluate.difference import frame_grid, image_difference
+from orthoscope.evaluation.difference import frame_grid, image_difference
 from orthoscope.io.images import read_image
 from orthoscope.io.own_json import load_camera, load_detections
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orthoscope.evaluate.render import photographs
-from orthoscope.evaluate.simulate import Scene, random_views, simulate_detections
+from orthoscope.evaluation.render import photographs
+from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
 from orthoscope.experiments.documents import documents
 from orthoscope.experiments.photographs import SPLITS, obliqueness, split
 from orthoscope.experiments.section4 import Plan, run

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -96,11 +97,61 @@ def test_a_photograph_that_is_cut_off_is_refused_not_read_half(tmp_path, suffix,
         read_image(tmp_path / f"a{suffix}", grey=True)
 
 
-@pytest.mark.parametrize(("content", "word"), [(b"", "is empty"), (b"not an image", "is not an image")])
-def test_what_is_no_photograph_is_named(tmp_path, content, word):
+@pytest.mark.parametrize("suffix", [".bmp", ".tif", ".webp", ".pgm"])
+def test_other_formats_that_are_cut_off_are_refused_by_their_decoders(tmp_path, suffix):
+    whole = cv2.imencode(suffix, PICTURE)[1].tobytes()
+    (tmp_path / f"a{suffix}").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="not an image that can be read"):
+        read_image(tmp_path / f"a{suffix}", grey=True)
+
+
+def with_thumbnail(jpeg: bytes) -> bytes:
+    """A JPEG that carries a whole smaller one before its own picture."""
+    thumbnail = cv2.imencode(".jpg", PICTURE[::4, ::4])[1].tobytes()
+    return jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(thumbnail) + 2) + thumbnail + jpeg[2:]
+
+
+def test_the_end_of_a_thumbnail_is_not_taken_for_the_end_of_the_photograph(tmp_path):
+    whole = with_thumbnail(cv2.imencode(".jpg", PICTURE)[1].tobytes())
+    (tmp_path / "whole.jpg").write_bytes(whole)
+    assert read_image(tmp_path / "whole.jpg", grey=True).shape == PICTURE.shape
+    (tmp_path / "cut.jpg").write_bytes(whole[: 2 * len(whole) // 3])
+    with pytest.raises(InputError, match="is cut off"):
+        read_image(tmp_path / "cut.jpg", grey=True)
+
+
+@pytest.mark.parametrize(
+    "flags", [[], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1], [cv2.IMWRITE_JPEG_RST_INTERVAL, 2]], ids=["plain", "progressive", "restarts"]
+)
+def test_what_a_telephone_puts_after_the_picture_does_no_harm(tmp_path, flags):
+    jpeg = cv2.imencode(".jpg", PICTURE, flags)[1].tobytes()
+    (tmp_path / "a.jpg").write_bytes(jpeg + bytes(10_000))
+    assert_array_equal(read_image(tmp_path / "a.jpg", grey=True), cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE))
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [(b"", "is empty"), (b"not an image", "is not an image"), (b"BM", "is not an image"), (b"\x89PNG\r\n\x1a\n", "cut off")],
+)
+def test_what_is_no_photograph_is_named_and_opencv_says_nothing_besides(tmp_path, capfd, content, word):
     (tmp_path / "a.png").write_bytes(content)
     with pytest.raises(InputError, match=word):
         read_image(tmp_path / "a.png", grey=True)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_one_photograph_named_in_two_ways_comes_once(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert photographs(["left2.png", folder / "left2.png", "./inner/../left2.png"]) == [Path("left2.png")]
+
+
+def test_a_glob_takes_photographs_only(folder):
+    assert [path.name for path in photographs(str(folder / "*"))] == ["left2.png", "left10.png"]
+
+
+def test_a_place_that_cannot_be_written_is_named(folder):
+    with pytest.raises(InputError, match="cannot be written"):
+        write_image(folder / "notes.txt/a.png", PICTURE)
 
 
 def test_a_name_without_a_format_is_refused_and_nothing_is_written(tmp_path):

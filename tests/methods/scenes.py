@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from orthoscope.evaluate.simulate import Scene, random_views, simulate_detections
+from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections, View, chessboard
 from orthoscope.models.camera import Camera, Intrinsics

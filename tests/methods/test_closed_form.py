@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scenes import BOARD, NARROW, WIDE, camera_with, facing, photographed, seen, some_corners
 
 from laws import for_every_lens
-from orthoscope.evaluate.simulate import random_views
+from orthoscope.evaluation.simulate import random_views
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections
 from orthoscope.methods.closed_form import CENTRED, CENTRED_SQUARE, GENERAL, NO_SKEW, intrinsics_of_homographies, poses_of_camera

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scenes import BOARD, NARROW, WIDE, K, camera_with, facing, image_difference, photographed, seen, some_corners, worst_image
 
 from laws import LENSES_TO_TRY
-from orthoscope.evaluate.simulate import random_views
+from orthoscope.evaluation.simulate import random_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections, View

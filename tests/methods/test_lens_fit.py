@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from orthoscope.evaluate.difference import frame_grid
+from orthoscope.evaluation.difference import frame_grid
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.centred_lens import _columns, _moved, fit_centred_lens, paired_parameters, parse_centred_lens, polynomial_of_radii
 from orthoscope.methods.lens_fit import FOCAL, converted, fit_lens

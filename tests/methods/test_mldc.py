@@ -12,9 +12,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scenes import NARROW, K, camera_with, photographed, some_corners
 
-from orthoscope.evaluate.difference import image_difference
-from orthoscope.evaluate.evaluation import evaluate_on
-from orthoscope.evaluate.simulate import paper_scene, simulate_detections
+from orthoscope.evaluation.difference import image_difference
+from orthoscope.evaluation.evaluate import evaluate_on
+from orthoscope.evaluation.simulate import paper_scene, simulate_detections
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods import METHODS

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from scenes import BOARD as SMALL
 from scenes import NARROW, WIDE, photographed, seen, some_corners
 
-from orthoscope.evaluate.difference import image_difference
-from orthoscope.evaluate.evaluation import evaluate_on
-from orthoscope.evaluate.simulate import Scene, paper_scene, random_views, simulate_detections
+from orthoscope.evaluation.difference import image_difference
+from orthoscope.evaluation.evaluate import evaluate_on
+from orthoscope.evaluation.simulate import Scene, paper_scene, random_views, simulate_detections
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.target import Detections, Target, View, chessboard
 from orthoscope.methods import METHODS

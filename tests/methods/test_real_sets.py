@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scenes import some_corners, worst_image
 
-from orthoscope.evaluate.evaluation import evaluate
+from orthoscope.evaluation.evaluate import evaluate
 from orthoscope.geometry.target import Detections
 from orthoscope.methods.calibration import residuals_of, rms
 from orthoscope.methods.fccm import fccm

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from test_closed_form import turned_boards
 
 from laws import for_every_lens
-from orthoscope.evaluate.simulate import random_views
+from orthoscope.evaluation.simulate import random_views
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections, View

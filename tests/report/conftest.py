@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orthoscope.evaluate.evaluation import Evaluation, ViewError
+from orthoscope.evaluation.evaluate import Evaluation, ViewError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections, SetAside, Target, View, chessboard
 from orthoscope.methods.calibration import Calibration, Uncertainty, rms

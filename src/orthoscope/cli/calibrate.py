@@ -74,7 +74,7 @@ def calibrate_into(
     """The main job; prints the summary and returns the evaluation."""
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
-    from orthoscope.evaluate.evaluation import evaluate
+    from orthoscope.evaluation.evaluate import evaluate
     from orthoscope.io.files import check_folder
     from orthoscope.io.inputs import detections_from
     from orthoscope.io.own_json import save

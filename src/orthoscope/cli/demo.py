@@ -28,8 +28,8 @@ def demo(seed: int, out: Path) -> None:
 
     from orthoscope.cli.calibrate import calibrate_into
     from orthoscope.cli.simulate import write_photographs
-    from orthoscope.evaluate.difference import frame_grid, image_difference
-    from orthoscope.evaluate.render import demo_scene
+    from orthoscope.evaluation.difference import frame_grid, image_difference
+    from orthoscope.evaluation.render import demo_scene
     from orthoscope.io.files import check_folder
     from orthoscope.io.own_json import save
 

@@ -45,8 +45,8 @@ def evaluate(
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
-    from orthoscope.evaluate.evaluation import evaluate as judge
-    from orthoscope.evaluate.evaluation import evaluate_on
+    from orthoscope.evaluation.evaluate import evaluate as judge
+    from orthoscope.evaluation.evaluate import evaluate_on
     from orthoscope.io.inputs import detections_from
     from orthoscope.io.own_json import load_calibration
 

@@ -31,7 +31,7 @@ Example:
 def report(calibration: Path, photos: tuple[str, ...], folds: int, keep: str, out: Path) -> None:
     """Write the report page of a calibration: one HTML file that needs nothing else."""
     from orthoscope.cli.progress import bar
-    from orthoscope.evaluate.evaluation import evaluate
+    from orthoscope.evaluation.evaluate import evaluate
     from orthoscope.io.files import check_folder
     from orthoscope.io.images import photographs
     from orthoscope.io.own_json import load_calibration

@@ -54,8 +54,8 @@ def simulate(
     """Make corners, or photographs, of a camera that is known."""
     import numpy as np
 
-    from orthoscope.evaluate.render import demo_scene
-    from orthoscope.evaluate.simulate import Scene, random_views, simulate_detections
+    from orthoscope.evaluation.render import demo_scene
+    from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
     from orthoscope.geometry.target import parse_target
     from orthoscope.io.files import check_folder
     from orthoscope.io.own_json import load_camera, save
@@ -80,7 +80,7 @@ def write_photographs(scene, folder: Path, *, seed: int) -> Path:
     import numpy as np
 
     from orthoscope.cli.progress import bar
-    from orthoscope.evaluate.render import photographs
+    from orthoscope.evaluation.render import photographs
     from orthoscope.io.images import write_image
 
     with bar("rendering") as progress:

@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from orthoscope.evaluate.evaluation import Evaluation
+    from orthoscope.evaluation.evaluate import Evaluation
     from orthoscope.models.camera import Camera
 
 __all__ = ["camera_numbers", "evaluation_lines", "evaluation_numbers", "to_json"]

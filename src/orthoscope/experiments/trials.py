@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.evaluate.evaluation import evaluate_on
-from orthoscope.evaluate.metrics import lateral_errors, normalised_calibration_error
-from orthoscope.evaluate.simulate import paper_scene, simulate_detections
+from orthoscope.evaluation.evaluate import evaluate_on
+from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
+from orthoscope.evaluation.simulate import paper_scene, simulate_detections
 from orthoscope.experiments.contenders import Contender
 from orthoscope.experiments.subgrids import on_subgrid
 from orthoscope.geometry.arrays import CalibrationError

@@ -55,7 +55,7 @@ def names_of(files: Iterable[Path]) -> list[str]:
     return [str(file) for file in files]
 
 
-def read_image(path: Path_, *, grey: bool) -> ndarray:
+def read_image(path: Path_, *, grey: bool = False) -> ndarray:
     """A photograph, upright: uint8 (h,w) where grey, else (h,w,3) blue, green, red.
 
     Raises InputError where the file is missing, empty, no image or cut off.

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orthoscope.evaluate.evaluation import Evaluation
+from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.io.files import write_text
 from orthoscope.report import tables

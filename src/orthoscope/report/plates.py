@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from orthoscope.evaluate.evaluation import Evaluation
+from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.report import figures
 
 __all__ = ["PLATES", "Plate"]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orthoscope.evaluate.evaluation import Evaluation
+from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.methods.calibration import Calibration
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import LENSES

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from orthoscope.evaluate.coverage import COVERAGE_GRID, cells_with_rays
+from orthoscope.evaluation.coverage import COVERAGE_GRID, cells_with_rays
 from orthoscope.geometry.arrays import Bool, ndarray
 from orthoscope.methods.calibration import Calibration
 from orthoscope.report.figures.cells import Cells

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orthoscope.evaluate.evaluation import Evaluation
+from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.calibration import Calibration
 from orthoscope.report.figures.cells import cells_for

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from orthoscope.evaluate.evaluation import Evaluation
+from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.target import Target
 from orthoscope.methods.calibration import Calibration

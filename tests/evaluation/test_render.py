@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from orthoscope.evaluate import render as rendering
-from orthoscope.evaluate.render import BACKGROUND, BLACK, MID_GREY, WHITE, Renderer, demo_scene, photographs, render
-from orthoscope.evaluate.simulate import Scene, random_views
+from orthoscope.evaluation import render as rendering
+from orthoscope.evaluation.render import BACKGROUND, BLACK, MID_GREY, WHITE, Renderer, demo_scene, photographs, render
+from orthoscope.evaluation.simulate import Scene, random_views
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Target, chessboard

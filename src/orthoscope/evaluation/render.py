@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.evaluate.simulate import Scene, random_views
+from orthoscope.evaluation.simulate import Scene, random_views
 from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Target, chessboard

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from orthoscope.evaluate.coverage import corners_by_cell
-from orthoscope.evaluate.evaluation import Evaluation, evaluate, evaluate_on
-from orthoscope.evaluate.simulate import Scene, random_views, simulate_detections
+from orthoscope.evaluation.coverage import corners_by_cell
+from orthoscope.evaluation.evaluate import Evaluation, evaluate, evaluate_on
+from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections, View, chessboard

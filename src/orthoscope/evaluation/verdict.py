@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.evaluate.coverage import emptiest_place
+from orthoscope.evaluation.coverage import emptiest_place
 from orthoscope.methods.calibration import Calibration
 from orthoscope.methods.held_out import HeldOut
 from orthoscope.solve.least_squares import Status

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from orthoscope.evaluate.simulate import BORDER, GRAZING, LEAST_SEEN, Scene, paper_scene, random_views, simulate_detections
+from orthoscope.evaluation.simulate import BORDER, GRAZING, LEAST_SEEN, Scene, paper_scene, random_views, simulate_detections
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Target, chessboard

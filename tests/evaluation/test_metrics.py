@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from orthoscope.evaluate.coverage import COVERAGE_GRID, corners_by_cell
-from orthoscope.evaluate.metrics import lateral_errors, normalised_calibration_error
+from orthoscope.evaluation.coverage import COVERAGE_GRID, corners_by_cell
+from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections, View, chessboard

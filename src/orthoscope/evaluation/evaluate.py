@@ -13,9 +13,9 @@ from functools import partial
 
 import numpy as np
 
-from orthoscope.evaluate.coverage import share_covered
-from orthoscope.evaluate.metrics import lateral_errors, normalised_calibration_error
-from orthoscope.evaluate.verdict import Findings, ViewError, corners_beyond, suspects_among, verdict_on, warnings_about
+from orthoscope.evaluation.coverage import share_covered
+from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
+from orthoscope.evaluation.verdict import Findings, ViewError, corners_beyond, suspects_among, verdict_on, warnings_about
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.target import Detections
 from orthoscope.methods import METHODS
