@@ -13,7 +13,7 @@ import numpy as np
 
 from orthoscope.evaluation.coverage import emptiest_place
 from orthoscope.methods.calibration import Calibration
-from orthoscope.methods.held_out import HeldOut
+from orthoscope.methods.held_out import FEWEST_VIEWS, HeldOut
 from orthoscope.solve.least_squares import Status
 
 __all__ = ["Findings", "ViewError", "corners_beyond", "suspects_among", "verdict_on", "warnings_about"]
@@ -91,10 +91,9 @@ def verdict_on(found: Findings) -> str:
     """One sentence: the error that counts, and whether anything stands against trusting it."""
     error, standard_error, trained = found.unseen.rms_px, found.unseen.standard_error_px, found.calibration.rms_px
     if np.isnan(error):
-        return (
-            f"{_px(trained)} px on its own photographs; nothing says how it does on others: too few views to hold any out. "
-            "Take more photographs before trusting it."
-        )
+        few = len(found.unseen.residuals) < FEWEST_VIEWS
+        why = "too few views to hold any out" if few else "without some of them, the others cannot tell the camera"
+        return f"{_px(trained)} px on its own photographs; nothing says how it does on others: {why}. Take more photographs before trusting it."
     places = _places(standard_error)
     size = (
         f"{error:.{places}f} ± {standard_error:.{places}f} px on photographs that were not used "

@@ -19,7 +19,7 @@ from orthoscope.methods.calibration import Calibration, residuals_of
 from orthoscope.methods.resection import resect
 from orthoscope.models.camera import Camera
 
-__all__ = ["HeldOut", "folds_of_views", "held_out"]
+__all__ = ["FEWEST_VIEWS", "HeldOut", "folds_of_views", "held_out"]
 
 FEWEST_VIEWS = 4  # with fewer, a fold would leave a calibration that rests on assumptions
 
