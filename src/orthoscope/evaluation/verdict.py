@@ -93,7 +93,8 @@ def verdict_on(found: Findings) -> str:
     if np.isnan(error):
         few = len(found.unseen.residuals) < FEWEST_VIEWS
         why = "too few views to hold any out" if few else "without some of them, the others cannot tell the camera"
-        return f"{_px(trained)} px on its own photographs; nothing says how it does on others: {why}. Take more photographs before trusting it."
+        on_its_own = f"{_px(trained)} px on its own photographs; nothing says how it does on others: {why}."
+        return f"{on_its_own} Take more photographs before trusting it."
     places = _places(standard_error)
     size = (
         f"{error:.{places}f} ± {standard_error:.{places}f} px on photographs that were not used "
