@@ -12,7 +12,7 @@ import pytest
 from orthoscope.cli import verbs
 from orthoscope.evaluation.difference import frame_grid, image_difference
 from orthoscope.io.images import read_image
-from orthoscope.io.own_json import load_camera, load_detections
+from orthoscope.io.own_json import load, load_camera, load_detections
 
 TARGET = "chessboard:9x6:25mm"
 
@@ -130,6 +130,35 @@ def test_simulate_makes_detections_from_which_its_camera_is_found_again(run, tmp
     assert json.loads(told.out)["rms_px"] < 1e-9
     truth, found = load_camera(tmp_path / "truth.json"), load_camera(tmp_path / "out/calibration.json")
     assert np.abs(image_difference(truth, found, frame_grid(truth.image_size))).max() < 1e-6  # no noise: only rounding
+
+
+def test_simulate_takes_a_lens_a_size_and_views_of_the_users_choice(run, tmp_path):
+    lens = ("--lens", "kannala_brandt:k1=-0.02", "--image-size", "800x600", "--focal", "300")
+    told = run("simulate", *lens, "--views", "9", "--fill", "0.3", "0.6", "--tilt-noise", "--partial", "--seed", "2", "-o", tmp_path)
+    assert told.code == 0, told.err
+    truth, found = load(tmp_path / "truth.json"), load_detections(tmp_path / "detections.json")
+    assert truth.camera.image_size == found.image_size == (800, 600)
+    assert truth.camera.lens.k1 == -0.02
+    assert len(truth.camera_from_target) == len(found.views) == 9
+    for pose, view in zip(truth.camera_from_target, found.views, strict=True):
+        seen = truth.camera.project(pose.apply(truth.target.points[view.ids]))
+        assert np.abs(seen - view.pixels).max() < 1.0  # noise of 0.1 to 0.2 px a coordinate
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("--lens", "brown:k1"), "brown:k1=-0.3"),
+        (("--lens", "brown:k9=1"), "k9"),
+        (("--focal", "500"), "--lens"),
+        (("--lens", "brown", "--camera", "truth.json"), "one of them"),
+    ],
+)
+def test_simulate_refuses_cameras_that_are_none(run, tmp_path, arguments, word):
+    told = run("simulate", *arguments, "-o", tmp_path / "out")
+    assert told.code == 2
+    assert word in told.err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ def demo(seed: int, out: Path) -> None:
     check_folder(out)
     scene = demo_scene(seed=seed)
     folder = write_photographs(scene, out / "photographs", seed=seed)
-    save(scene.camera, out / "truth.json")
+    save(scene, out / "truth.json")
     click.echo(f"rendered   {len(scene.camera_from_target)} photographs of {scene.target.name} into {folder}/")
     evaluation = calibrate_into((str(folder),), target=scene.target.name, out=out, lens="brown")
     apart = np.hypot(*image_difference(scene.camera, evaluation.calibration.camera, frame_grid(scene.camera.image_size)).T)

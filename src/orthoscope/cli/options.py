@@ -50,7 +50,9 @@ target: Decorator = click.option(
     metavar="SPEC",
     help="What was photographed: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g. chessboard:9x6:25mm.",
 )
-image_size: Decorator = click.option("--image-size", type=_Size(), help="Size of the photographs; needed with a corners.vnl table only.")
+image_size: Decorator = click.option(
+    "--image-size", type=_Size(), help="Size of the photographs; needed with a corners.vnl table or a simulated lens only."
+)
 lens: Decorator = click.option(
     "--lens",
     default="auto",

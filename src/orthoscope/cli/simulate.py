@@ -9,13 +9,16 @@ from pathlib import Path
 
 import click
 
+from orthoscope.cli import options
+
 __all__ = ["simulate", "write_photographs"]
 
 EXAMPLE = """\b
 Examples:
   $ orthoscope simulate --views 15 --noise 0.1 -o simulated/
-  wrote      simulated/detections.json, and simulated/truth.json, the camera
-  $ orthoscope simulate --camera camera/calibration.json --target chessboard:14x20:14mm --render -o simulated/
+  wrote      simulated/detections.json, and simulated/truth.json: camera, target and poses
+  $ orthoscope simulate --lens kannala_brandt:k1=-0.02 --image-size 1280x960 --focal 400 --render -o simulated/
+  $ orthoscope simulate --camera camera/calibration.json --target chessboard:14x20:14mm --tilt-noise -o simulated/
 """
 
 
@@ -24,8 +27,11 @@ Examples:
     "--camera",
     "source",
     type=click.Path(path_type=Path),
-    help="A camera.json or calibration.json; by default the camera of `orthoscope demo`.",
+    help="A camera.json, calibration.json or truth.json; by default the camera of `orthoscope demo`.",
 )
+@click.option("--lens", metavar="LENS", help="Instead of --camera: a lens with its coefficients, such as brown:k1=-0.3,k2=0.1.")
+@options.image_size
+@click.option("--focal", type=click.FloatRange(1), help="With --lens: focal length, pixels; by default the image's width.")
 @click.option("--target", default="chessboard:9x6:25mm", show_default=True, metavar="SPEC", help="What stands before the camera.")
 @click.option("--views", default=20, show_default=True, type=click.IntRange(1), help="How many photographs.")
 @click.option(
@@ -33,6 +39,14 @@ Examples:
 )
 @click.option("--tilt-noise", is_flag=True, help="Let the noise grow with the target's tilt, doubling at 70 degrees (the paper's law).")
 @click.option("--tilt", default=45.0, show_default=True, type=click.FloatRange(0, 70), help="Greatest tilt of the target, degrees.")
+@click.option(
+    "--fill",
+    nargs=2,
+    type=float,
+    default=(0.4, 0.9),
+    show_default=True,
+    help="Share of the image that it fills, from .. to.",
+)
 @click.option("--partial", is_flag=True, help="Let the target leave the frame.")
 @click.option("--render", "rendered", is_flag=True, help="Also render the photographs, into OUT/photographs.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of all that is random.")
@@ -41,11 +55,15 @@ Examples:
 )
 def simulate(
     source: Path | None,
+    lens: str | None,
+    image_size: tuple[int, int] | None,
+    focal: float | None,
     target: str,
     views: int,
     noise: float,
     tilt_noise: bool,
     tilt: float,
+    fill: tuple[float, float],
     partial: bool,
     rendered: bool,
     seed: int,
@@ -54,25 +72,42 @@ def simulate(
     """Make corners, or photographs, of a camera that is known."""
     import numpy as np
 
-    from orthoscope.evaluation.render import demo_scene
     from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
     from orthoscope.geometry.target import parse_target
     from orthoscope.io.files import check_folder
-    from orthoscope.io.own_json import load_camera, save
+    from orthoscope.io.own_json import save
 
     check_folder(out)
     rng = np.random.default_rng(seed)
-    camera, board = load_camera(source) if source else demo_scene().camera, parse_target(target)
-    poses = random_views(
-        camera, board, views, rng=rng, tilt=(0.0, np.deg2rad(tilt)), whole=not partial, margin=_square(board) if rendered else 0.0
-    )
+    camera, board = _camera(source, lens, image_size, focal), parse_target(target)
+    margin = _square(board) if rendered else 0.0  # the outer squares are to be in the picture too
+    poses = random_views(camera, board, views, rng=rng, tilt=(0.0, np.deg2rad(tilt)), fill=fill, whole=not partial, margin=margin)
     scene = Scene(camera, board, poses)
     save(simulate_detections(scene, noise_px=noise, rng=rng, tilt_noise=tilt_noise), out / "detections.json")
-    save(camera, out / "truth.json")
-    click.echo(f"wrote      {out / 'detections.json'}, and {out / 'truth.json'}, the camera")
+    save(scene, out / "truth.json")
+    click.echo(f"wrote      {out / 'detections.json'}, and {out / 'truth.json'}: camera, target and poses")
     if rendered:
         folder = write_photographs(scene, out / "photographs", seed=seed)
         click.echo(f"wrote      {views} photographs into {folder}/")
+
+
+def _camera(source: Path | None, lens: str | None, image_size: tuple[int, int] | None, focal: float | None):
+    """The camera that was asked for: of a file, of a lens, or that of the demo."""
+    from orthoscope.evaluation.render import demo_scene
+    from orthoscope.geometry.arrays import InputError
+    from orthoscope.io.own_json import load_camera
+    from orthoscope.models.camera import Camera, Intrinsics
+    from orthoscope.models.lenses import lens_with_values
+
+    if source and lens:
+        raise InputError("both --camera and --lens were given; expected one of them. Drop the other.")
+    if not lens:
+        if image_size or focal:
+            raise InputError("--image-size and --focal go with --lens; a camera of a file has its own. Add --lens or drop them.")
+        return load_camera(source) if source else demo_scene().camera
+    width, height = image_size or (1280, 960)
+    focal = focal or float(width)
+    return Camera((width, height), Intrinsics(focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)), lens_with_values(lens))
 
 
 def write_photographs(scene, folder: Path, *, seed: int) -> Path:

@@ -1,4 +1,4 @@
-"""Our own files: `detections.json`, `calibration.json` and `camera.json`, saved and loaded.
+"""Our own files: `detections.json`, `calibration.json`, `camera.json` and a simulated scene's `truth.json`, saved and loaded.
 
 Floor 5.  Each is one JSON object that opens with what it is and in which format: {"orthoscope": "calibration", "format": 1, ...}.
 What is loaded equals what was saved to the last bit, and the same thing saved twice gives the same bytes.
@@ -12,11 +12,12 @@ from typing import Any
 
 import msgspec
 
+from orthoscope.evaluation.simulate import Scene
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.target import Detections
 from orthoscope.io.files import read_bytes, write_text
 from orthoscope.io.json_layout import lay_out
-from orthoscope.io.schema import CalibrationFile, CameraFile, DetectionsFile
+from orthoscope.io.schema import CalibrationFile, CameraFile, DetectionsFile, SceneFile
 from orthoscope.methods.calibration import Calibration
 from orthoscope.models.camera import Camera
 
@@ -27,6 +28,7 @@ KINDS: dict[str, tuple[type, Any]] = {  # what a file says it is: the type in me
     "detections": (Detections, DetectionsFile),
     "calibration": (Calibration, CalibrationFile),
     "camera": (Camera, CameraFile),
+    "scene": (Scene, SceneFile),
 }
 
 
@@ -44,8 +46,8 @@ def _document(schema: type) -> type:
 DOCUMENTS = {kind: _document(schema) for kind, (_, schema) in KINDS.items()}
 
 
-def save(thing: Detections | Calibration | Camera, path: str | Path) -> None:
-    """Writes detections, a calibration or a camera to a file of our own, as a whole.
+def save(thing: Detections | Calibration | Camera | Scene, path: str | Path) -> None:
+    """Writes detections, a calibration, a camera or a scene to a file of our own, as a whole.
 
     Raises InputError where the place cannot be written or a setting has no plain value.
     """
@@ -59,7 +61,7 @@ def save(thing: Detections | Calibration | Camera, path: str | Path) -> None:
     raise InputError(f"{type(thing).__name__} cannot be saved; expected one of {', '.join(KINDS)}.")
 
 
-def load(path: str | Path) -> Detections | Calibration | Camera:
+def load(path: str | Path) -> Detections | Calibration | Camera | Scene:
     """Whatever one of our files holds.
 
     Raises InputError for a file that is missing, cut off, of another program or of a newer version, and for values that cannot be.
@@ -85,9 +87,9 @@ def load_calibration(path: str | Path) -> Calibration:
 
 
 def load_camera(path: str | Path) -> Camera:
-    """The camera of a file, also out of a calibration; errors as `load`."""
+    """The camera of a file, also out of a calibration or a scene; errors as `load`."""
     thing = load(path)
-    return _expect(Camera, thing.camera if isinstance(thing, Calibration) else thing, path)
+    return _expect(Camera, thing.camera if isinstance(thing, Calibration | Scene) else thing, path)
 
 
 def _expect(core: type, thing: Any, path: str | Path) -> Any:

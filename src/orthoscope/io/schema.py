@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from orthoscope.evaluation.simulate import Scene
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Detections, SetAside, Target, View
@@ -20,7 +21,7 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import LENSES
 
-__all__ = ["CalibrationFile", "CameraFile", "DetectionsFile"]
+__all__ = ["CalibrationFile", "CameraFile", "DetectionsFile", "SceneFile"]
 
 Row = list[float]
 
@@ -188,6 +189,19 @@ class CalibrationFile(_Struct, kw_only=True):
             version=self.version,
             assumptions=tuple(self.assumptions),
         )
+
+
+class SceneFile(_Struct):
+    camera: CameraFile
+    target: TargetFile
+    camera_from_target: list[PoseFile]
+
+    @classmethod
+    def of(cls, scene: Scene) -> SceneFile:
+        return cls(CameraFile.of(scene.camera), TargetFile.of(scene.target), [PoseFile.of(pose) for pose in scene.camera_from_target])
+
+    def core(self) -> Scene:
+        return Scene(self.camera.core(), self.target.core(), tuple(pose.core() for pose in self.camera_from_target))
 
 
 def _array(rows: Any) -> ndarray:

@@ -24,7 +24,7 @@ from orthoscope.models.charts import EQUIDISTANT, GNOMONIC
 from orthoscope.models.lens import Lens, RadialLens, Warp
 from orthoscope.models.warp import invert
 
-__all__ = ["LENSES", "Brown", "Division", "Fet", "Fov", "KannalaBrandt", "Pfet", "Rational", "lens_name", "parse_lens"]
+__all__ = ["LENSES", "Brown", "Division", "Fet", "Fov", "KannalaBrandt", "Pfet", "Rational", "lens_name", "lens_with_values", "parse_lens"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -431,6 +431,20 @@ def parse_lens(text: str) -> tuple[type[Lens], tuple[str, ...]]:
         if coefficient not in lens.names():
             raise InputError(f"lens {name!r} has no coefficient {coefficient!r}; it has {', '.join(lens.names())}.")
     return lens, free
+
+
+def lens_with_values(text: str) -> Lens:
+    """The lens of a description with values, such as `brown:k1=-0.3,k2=0.1`; coefficients that are not named keep their usual value.
+
+    Raises InputError for a lens, a coefficient or a value that is none.
+    """
+    name, _, listed = text.strip().partition(":")
+    lens, _ = parse_lens(name)
+    try:
+        values = {key.strip(): float(value) for key, value in (part.split("=") for part in listed.split(",") if part.strip())}
+    except ValueError as error:
+        raise InputError(f"lens {text!r} is not understood; expected a name and values, such as brown:k1=-0.3,k2=0.1.") from error
+    return lens().with_coefficients(**values)
 
 
 def lens_name(lens: Lens) -> str:
