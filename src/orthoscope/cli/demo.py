@@ -14,6 +14,10 @@ __all__ = ["demo"]
 EXAMPLE = """\b
 Example:
   $ orthoscope demo -o demo/
+  rendered   20 photographs of chessboard:14x9:16mm into demo/photographs/
+  views      20 used, 0 set aside; 2520 corners
+  ...
+  truth      the recovered camera is 0.004 px from the true one on average over the frame, 0.006 px at most
 """
 
 

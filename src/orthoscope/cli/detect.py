@@ -16,8 +16,7 @@ __all__ = ["detect"]
 EXAMPLE = """\b
 Example:
   $ orthoscope detect photos/ --target chessboard:9x6:25mm -o detections.json
-  views      13 of 14 photographs, 702 corners, 640x480
-             left03.jpg: no chessboard of 9x6 inner corners found
+  views      14 of 14 photographs, 756 corners, 640x480
   wrote      detections.json
 """
 

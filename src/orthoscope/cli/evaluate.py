@@ -18,8 +18,8 @@ Examples:
   $ orthoscope evaluate camera/calibration.json
   $ orthoscope evaluate camera/calibration.json --on other_photos/ --target chessboard:9x6:25mm
   views      5 used; 270 corners
-  rms        0.201 px per point, camera fixed, poses fitted
-  NCE        0.452 (1 is what rounding to whole pixels would give)
+  rms        0.158 px per point, camera fixed, poses fitted
+  NCE        0.357 (1 is what rounding to whole pixels would give)
 """
 
 
