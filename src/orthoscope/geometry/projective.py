@@ -19,6 +19,9 @@ from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["FittedLines", "cross_ratio", "cross_ratio_slope", "fitted_lines", "homographies_to_pixels", "homographies_to_rays"]
 
+SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # where the entries of a symmetric 3x3 matrix stand among its six
+VIEWS_AT_ONCE = 15  # so that the intermediate arrays stay in the processor's cache
+
 
 def homographies_to_rays(
     points: Float[ndarray, "v n 2"], rays: Float[ndarray, "v n 3"], weights: Float[ndarray, "v n"]
@@ -27,17 +30,25 @@ def homographies_to_rays(
 
     points: target plane, metres.  rays: any length.  weights: 0 where there is no corner.
     """
-    normalised, plane_from_target = _hartley(points, weights)
-    p = np.concatenate([normalised, np.ones_like(normalised[..., :1])], axis=-1)
-    view, n = weights.shape
-    pp = (p[..., :, None] * p[..., None, :]).reshape(view, n, 9)
-    rr = np.eye(3) * (rays * rays).sum(-1)[..., None, None] - rays[..., :, None] * rays[..., None, :]
-    blocks = np.swapaxes(rr.reshape(view, n, 9) * weights[..., None], 1, 2) @ pp  # (v, 9 of r, 9 of p)
-    normal = blocks.reshape(view, 3, 3, 3, 3).transpose(0, 1, 3, 2, 4).reshape(view, 9, 9)
-    h = np.linalg.eigh(normal)[1][:, :, 0].reshape(view, 3, 3)
-    forward = (weights * ((p @ np.swapaxes(h, 1, 2)) * rays).sum(-1)).sum(-1)
-    h = h * np.where(forward < 0, -1.0, 1.0)[:, None, None] @ plane_from_target
+    h = np.empty((len(points), 3, 3))
+    for start in range(0, len(points), VIEWS_AT_ONCE):
+        some = slice(start, start + VIEWS_AT_ONCE)
+        h[some] = _homographies(points[some], rays[some], weights[some])
     return h / np.sqrt((h * h).sum((1, 2), keepdims=True))
+
+
+def _homographies(points: ndarray, rays: ndarray, weights: ndarray) -> ndarray:
+    """`homographies_to_rays` of some views, not scaled; both factors of the normal matrix are symmetric, so six sums stand for nine."""
+    normalised, plane_from_target = _hartley(points, weights)
+    (X, Y), (x, y, z) = np.moveaxis(normalised, -1, 0), np.moveaxis(rays, -1, 0)
+    one = np.ones_like(X)
+    pp = np.stack([X * X, X * Y, X, Y * Y, Y, one], axis=1)
+    rr = np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y], axis=1) * weights[:, None]
+    sums = rr @ pp.transpose(0, 2, 1)
+    normal = sums[:, SYMMETRIC[:, None, :, None], SYMMETRIC[None, :, None, :]].reshape(-1, 9, 9)
+    h = np.linalg.eigh(normal)[1][:, :, 0].reshape(-1, 3, 3)
+    forward = ((h @ np.stack([X, Y, one], axis=1)) * np.stack([x, y, z], axis=1)).sum(1)
+    return h * np.where((weights * forward).sum(-1) < 0, -1.0, 1.0)[:, None, None] @ plane_from_target
 
 
 def homographies_to_pixels(
