@@ -29,7 +29,7 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.lens_fit import Pairs, fit_pairs
 from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
+from orthoscope.models.lens import Formula
 from orthoscope.models.lenses import Fet, Pfet, parse_lens
 from orthoscope.solve.least_squares import Options, Solution
 from orthoscope.solve.losses import Loss
@@ -45,10 +45,10 @@ __all__ = [
 
 CENTRE = ("centre_x", "centre_y")
 OFF_CENTRE = ("p1", "p2", "s1", "s2", "s3", "s4", "tau_x", "tau_y")  # what a centre of its own stands for, but for small print
-SCALE: dict[type[Lens], str] = {Pfet: "a1", Fet: "scale"}  # the coefficient that scales the photograph; the others have none
+SCALE: dict[type[Formula], str] = {Pfet: "a1", Fet: "scale"}  # the coefficient that scales the photograph; the others have none
 
 
-def parse_centred_lens(text: str) -> tuple[type[Lens], tuple[str, ...]]:
+def parse_centred_lens(text: str) -> tuple[type[Formula], tuple[str, ...]]:
     """As `parse_lens`, for a lens with a centre of its own: `auto` is the paper's `pfet`, and only radial coefficients are free by default.
 
     Raises InputError where `parse_lens` does.
@@ -57,13 +57,13 @@ def parse_centred_lens(text: str) -> tuple[type[Lens], tuple[str, ...]]:
     return kind, free if ":" in text else tuple(name for name in free if name not in OFF_CENTRE)
 
 
-def paired_parameters(lens: type[Lens], coefficients: Sequence[str]) -> tuple[str, ...]:
+def paired_parameters(lens: type[Formula], coefficients: Sequence[str]) -> tuple[str, ...]:
     """What is asked of pairs: the coefficients, what scales, and the centre."""
     centre = CENTRE if set(coefficients).isdisjoint(OFF_CENTRE) else ()
     return tuple(dict.fromkeys((*coefficients, SCALE.get(lens, "stretch"), *centre)))
 
 
-def straightened_parameters(lens: type[Lens], coefficients: Sequence[str]) -> tuple[str, ...]:
+def straightened_parameters(lens: type[Formula], coefficients: Sequence[str]) -> tuple[str, ...]:
     """What is asked of straight lines: the coefficients but for slopes, or the frame's scale where that is all there is, and the centre."""
     shape = ("frame_scale",) if lens.scaled_by else tuple(name for name in coefficients if name != SCALE.get(lens))
     return (*shape, *(CENTRE if set(coefficients).isdisjoint(OFF_CENTRE) else ()))

@@ -15,7 +15,7 @@ import numpy as np
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.reprojection import parameter_columns, with_parameters
 from orthoscope.models.camera import Camera
-from orthoscope.models.lens import Lens
+from orthoscope.models.lens import Formula
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
 
@@ -67,7 +67,7 @@ def fit_lens(rays: Float[ndarray, "n 3"], pixels: Float[ndarray, "n 2"], start: 
     return solve(_about_principal_point(rays, pixels, free), start)
 
 
-def converted(camera: Camera, lens: type[Lens], rays: Float[ndarray, "n 3"], *, free: Sequence[str] = ()) -> Camera:
+def converted(camera: Camera, lens: type[Formula], rays: Float[ndarray, "n 3"], *, free: Sequence[str] = ()) -> Camera:
     """The camera with another lens formula, nearest in pixels to the first over the given rays.
 
     free: parameters of K and the lens that move; by default FOCAL and what the formula frees.

@@ -28,7 +28,7 @@ from orthoscope.methods.observations import Observations
 from orthoscope.methods.reprojection import Estimate, Reprojection
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.charts import GNOMONIC
-from orthoscope.models.lens import Lens
+from orthoscope.models.lens import Formula
 from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Cauchy
@@ -41,7 +41,7 @@ SAMPLE = 48  # views that tell whether a base fits, and refine it
 GOOD = 0.01  # a pin-hole start that misses by less than this share of the diagonal is taken without looking further
 WIDE = np.deg2rad(60.0)  # corners farther from the axis than this ask for a lens of the angle
 STEEP = np.deg2rad(88.0)  # rays farther out than this no lens of the plane is fitted to
-ALIKE: dict[type[Lens], tuple[dict[str, float], ...]] = {  # coefficients of no distortion, in different valleys of the cost
+ALIKE: dict[type[Formula], tuple[dict[str, float], ...]] = {  # coefficients of no distortion, in different valleys of the cost
     Rational: ({}, {"k1": 1.0, "k4": 1.0}),
 }
 
@@ -129,7 +129,7 @@ class Bases:
         return Estimate(camera, poses_of_camera(camera, self.observations, self.points))
 
 
-def starts(bases: Bases, lens: type[Lens], *, coefficients: Sequence[str] | None = None) -> list[Estimate]:
+def starts(bases: Bases, lens: type[Formula], *, coefficients: Sequence[str] | None = None) -> list[Estimate]:
     """Where to start from to get a camera with the wanted lens, the likelier first.
 
     coefficients: those that will move, by default what the lens frees; the others have their usual values.
@@ -179,7 +179,7 @@ def _misfit(estimate: Estimate, observations: Observations, points: Float[ndarra
     return misfit if np.isfinite(misfit) else np.inf
 
 
-def _with_lens(bases: Bases, base: Estimate, lens: type[Lens], coefficients: Sequence[str]) -> list[Estimate]:
+def _with_lens(bases: Bases, base: Estimate, lens: type[Formula], coefficients: Sequence[str]) -> list[Estimate]:
     """A base with the wanted lens: as it is where that lens contains the base's own, else refined and converted."""
     if isinstance(base.camera.lens, lens) or (isinstance(base.camera.lens, Brown) and lens is Rational):
         alike = [same for same in ALIKE.get(lens, ({},)) if set(same) <= set(coefficients)]
@@ -191,7 +191,7 @@ def _with_lens(bases: Bases, base: Estimate, lens: type[Lens], coefficients: Seq
     return [bases.posed(converted(refined, lens, rays, free=(*bases.narrowing.free, *coefficients)))]
 
 
-def _before_steep(rays: Float[ndarray, "n 3"], lens: type[Lens]) -> Float[ndarray, "m 3"]:
+def _before_steep(rays: Float[ndarray, "n 3"], lens: type[Formula]) -> Float[ndarray, "m 3"]:
     """Rays without the few that lie beside or behind the camera; more than a few no lens of the plane can see."""
     flat = rays[:, 2] > np.cos(STEEP)
     if flat.mean() < 0.99:

@@ -25,7 +25,7 @@ from orthoscope.methods.start import FIELDS
 from orthoscope.methods.straightness import LinesOfSight, Straightness
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.charts import EQUIDISTANT
-from orthoscope.models.lens import Lens
+from orthoscope.models.lens import Formula
 from orthoscope.solve.least_squares import Options, Solution, shared_covariance, solve
 from orthoscope.solve.losses import Cauchy, Linear, Loss
 
@@ -60,7 +60,7 @@ def fit_straight_lens(
     observations: Observations,
     target: Target,
     image_size: tuple[int, int],
-    lens: type[Lens],
+    lens: type[Formula],
     coefficients: tuple[str, ...],
     *,
     loss: Loss,
@@ -111,7 +111,7 @@ def _best(solutions: list[Solution[LinesOfSight]]) -> Solution[LinesOfSight]:
     return next(solution for solution in solutions if solution.cost <= (1.0 + EQUAL) * least)
 
 
-def _likeliest(problem: Straightness, image_size: tuple[int, int], lens: type[Lens]) -> list[Camera]:
+def _likeliest(problem: Straightness, image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
     """The starts under which the lines are least bent as they are, the best first; raises CalibrationError as `fit_straight_lens` does."""
     _check_enough(problem)
     cameras = _starts(image_size, lens)
@@ -125,7 +125,7 @@ def _likeliest(problem: Straightness, image_size: tuple[int, int], lens: type[Le
     return [cameras[i] for i in usable[np.argsort(bent[usable], kind="stable")][:TRIED]]
 
 
-def _starts(image_size: tuple[int, int], lens: type[Lens]) -> list[Camera]:
+def _starts(image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
     """The lens's own cameras to try, about the image's centre; the unit of a lens of the plane is the image's longer side."""
     width, height = image_size
     diagonal = float(np.hypot(width, height))

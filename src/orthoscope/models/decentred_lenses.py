@@ -15,14 +15,14 @@ import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.charts import GNOMONIC
-from orthoscope.models.lens import Lens, Warp
+from orthoscope.models.lens import Formula, Warp
 from orthoscope.models.warp import invert
 
 __all__ = ["Brown", "Rational"]
 
 
 @dataclass(frozen=True, eq=False)
-class _Decentred(Lens):
+class _Decentred(Formula):
     """A radial curve with decentering (p), thin prism (s) and sensor tilt (tau, radians) added, as OpenCV adds them."""
 
     chart = GNOMONIC

@@ -24,7 +24,7 @@ from orthoscope.models.charts import Chart
 from orthoscope.models.domain import Domain, find_domain
 from orthoscope.models.warp import Warp, determinant
 
-__all__ = ["Lens", "RadialLens", "Warp"]
+__all__ = ["Formula", "Lens", "RadialLens", "Warp"]
 
 SAMPLES = 1024  # radii at which a curve is tabulated: as start of the inverse, and to find the first fold
 SECTORS = 32  # of directions in the image, for each of which it is known how far the image reaches
@@ -33,40 +33,45 @@ STEEPEST = 1e-6  # a gnomonic chart is looked at up to this close to 90 degrees 
 TINY = 1e-150  # a radius next to zero whose square is a number still
 
 AnyLens = TypeVar("AnyLens", bound="Lens")
+AnyFormula = TypeVar("AnyFormula", bound="Formula")
 
 
 @dataclass(frozen=True, eq=False)
 class Lens(ABC):
-    """A lens: `distort` takes rays to its plane, `undistort` takes them back; NaN where there is no image.
+    """A lens: `distort` takes rays to its plane, `undistort` takes them back; NaN where there is no image."""
 
-    Subclasses are frozen dataclasses whose fields are the coefficients, in order.
-    """
-
-    chart: ClassVar[Chart]
-    free: ClassVar[tuple[str, ...]]  # what a joint calibration frees unless told otherwise; the rest keeps its value
-    radially_symmetric: ClassVar[bool]
     scaled_by: ClassVar[str | None] = None  # the coefficient that scales the whole plane, as K does too
-    starts: ClassVar[tuple[dict[str, float], ...]] = ({},)  # coefficients from which a fit may have to start to find its minimum
-
-    def __post_init__(self) -> None:
-        frozen([getattr(self, name) for name in self.names()], (None,), f"{type(self).__name__}: coefficients")
-
-    @classmethod
-    def names(cls) -> tuple[str, ...]:
-        """The coefficients' names, in order."""
-        return tuple(field.name for field in fields(cls))
 
     @property
-    def coefficients(self) -> Float[ndarray, " p"]:
-        """The coefficients (p,), in order."""
-        return np.array([getattr(self, name) for name in self.names()], dtype=float)
+    @abstractmethod
+    def chart(self) -> Chart:
+        """The plane in which rays are described."""
 
+    @property
+    @abstractmethod
+    def radially_symmetric(self) -> bool:
+        """Whether the lens is its radial curve and nothing else."""
+
+    @property
+    @abstractmethod
+    def free(self) -> tuple[str, ...]:
+        """The coefficients that a joint calibration frees unless told otherwise; the rest keeps its value."""
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> Float[ndarray, " p"]:
+        """The coefficients (p,) that have names, in order."""
+
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """The coefficients' names, in order."""
+
+    @abstractmethod
     def with_coefficients(self: AnyLens, **values: float) -> AnyLens:
-        """The same lens with some coefficients replaced."""
-        unknown = set(values) - set(self.names())
-        if unknown:
-            raise InputError(f"{type(self).__name__} has no coefficient {sorted(unknown)[0]!r}; it has {', '.join(self.names())}.")
-        return replace(self, **{name: float(value) for name, value in values.items()})
+        """The same lens with some coefficients replaced.
+
+        Raises InputError for a coefficient that it does not have.
+        """
 
     @abstractmethod
     def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
@@ -238,7 +243,34 @@ class Lens(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class RadialLens(Lens):
+class Formula(Lens):
+    """A lens whose coefficients are all there is to it: subclasses are frozen dataclasses whose fields are the coefficients, in order."""
+
+    chart: ClassVar[Chart]  # type: ignore[misc]
+    radially_symmetric: ClassVar[bool]  # type: ignore[misc]
+    free: ClassVar[tuple[str, ...]]  # type: ignore[misc]
+    starts: ClassVar[tuple[dict[str, float], ...]] = ({},)  # coefficients from which a fit may have to start to find its minimum
+
+    def __post_init__(self) -> None:
+        frozen([getattr(self, name) for name in self.names()], (None,), f"{type(self).__name__}: coefficients")
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:  # type: ignore[override]  # a formula's names are its kind's
+        return tuple(field.name for field in fields(cls))
+
+    @property
+    def coefficients(self) -> Float[ndarray, " p"]:
+        return np.array([getattr(self, name) for name in self.names()], dtype=float)
+
+    def with_coefficients(self: AnyFormula, **values: float) -> AnyFormula:
+        unknown = set(values) - set(self.names())
+        if unknown:
+            raise InputError(f"{type(self).__name__} has no coefficient {sorted(unknown)[0]!r}; it has {', '.join(self.names())}.")
+        return replace(self, **{name: float(value) for name, value in values.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class RadialLens(Formula):
     """A lens that is nothing but its curve: a subclass says `gain` and `gain_by`, the rest is here."""
 
     radially_symmetric: ClassVar[bool] = True

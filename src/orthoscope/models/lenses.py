@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from orthoscope.geometry.arrays import InputError
 from orthoscope.models.decentred_lenses import Brown, Rational
-from orthoscope.models.lens import Lens
+from orthoscope.models.lens import Formula, Lens
 from orthoscope.models.radial_lenses import Division, Fet, Fov, KannalaBrandt, Pfet
 
 __all__ = ["LENSES", "Brown", "Division", "Fet", "Fov", "KannalaBrandt", "Pfet", "Rational", "lens_name", "lens_with_values", "parse_lens"]
 
-LENSES: dict[str, type[Lens]] = {
+LENSES: dict[str, type[Formula]] = {
     "brown": Brown,
     "rational": Rational,
     "pfet": Pfet,
@@ -23,7 +23,7 @@ LENSES: dict[str, type[Lens]] = {
 }
 
 
-def parse_lens(text: str) -> tuple[type[Lens], tuple[str, ...]]:
+def parse_lens(text: str) -> tuple[type[Formula], tuple[str, ...]]:
     """The lens of a description such as `brown` or `brown:k1,k2`, and the coefficients that a calibration is to free.
 
     Raises InputError for a lens or a coefficient that is not there.
@@ -39,7 +39,7 @@ def parse_lens(text: str) -> tuple[type[Lens], tuple[str, ...]]:
     return lens, free
 
 
-def lens_with_values(text: str) -> Lens:
+def lens_with_values(text: str) -> Formula:
     """The lens of a description with values, such as `brown:k1=-0.3,k2=0.1`; coefficients that are not named keep their usual value.
 
     Raises InputError for a lens, a coefficient or a value that is none.
