@@ -12,7 +12,9 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Detections
+from orthoscope.methods.calibration import points_of
 from orthoscope.models.camera import WIDEST, Camera, Intrinsics
+from orthoscope.models.target_shape import TargetShape
 
 __all__ = ["lateral_errors", "normalised_calibration_error"]
 
@@ -33,13 +35,15 @@ def normalised_calibration_error(estimated: Float[ndarray, "n 3"], observed: Flo
     return float((lateral / rounding).mean())
 
 
-def lateral_errors(camera: Camera, camera_from_target: Sequence[Pose], detections: Detections) -> tuple[ndarray, ndarray]:
+def lateral_errors(
+    camera: Camera, camera_from_target: Sequence[Pose], detections: Detections, *, shape: TargetShape | None = None
+) -> tuple[ndarray, ndarray]:
     """Points as back-projected from the detected pixels and as the poses place them (n,3 each), for NCE.
 
     Corners that no straight image would hold (WIDEST), or whose pixel no ray reaches, are left out: towards 90 degrees a lateral error
     grows without end.
     """
-    points = detections.target.points
+    points = points_of(detections.target, shape)
     observed = np.concatenate([pose.apply(points[view.ids]) for pose, view in zip(camera_from_target, detections.views, strict=True)])
     rays = camera.unproject(np.concatenate([view.pixels for view in detections.views]))
     usable = (rays[:, 2] > np.cos(WIDEST)) & (observed[:, 2] > np.cos(WIDEST) * np.sqrt((observed**2).sum(-1)))

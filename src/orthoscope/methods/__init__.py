@@ -12,6 +12,7 @@ from typing import Any
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.target import Detections
 from orthoscope.methods.calibration import Calibration
+from orthoscope.methods.decoupled import decoupled
 from orthoscope.methods.fccm import fccm
 from orthoscope.methods.mldc import mldc
 from orthoscope.methods.nmldc import nmldc
@@ -19,13 +20,14 @@ from orthoscope.methods.nmldc import nmldc
 __all__ = ["METHODS", "calibrate"]
 
 METHODS: dict[str, Callable[..., Calibration]] = {
+    "decoupled": decoupled,
     "fccm": fccm,
     "mldc": mldc,
     "nmldc": nmldc,
 }
 
 
-def calibrate(detections: Detections, *, method: str = "fccm", **settings: Any) -> Calibration:
+def calibrate(detections: Detections, *, method: str = "decoupled", **settings: Any) -> Calibration:
     """Calibrate a camera from detections by a method of METHODS; its settings are the method's own (lens, skew, loss, ...).
 
     Raises CalibrationError where the views cannot tell the camera, InputError for a method or a setting that is none.

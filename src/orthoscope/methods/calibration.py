@@ -6,17 +6,18 @@ Floor 3.  A calibration keeps its inputs, so that it can be recomputed, refitted
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.geometry.target import Detections
+from orthoscope.geometry.target import Detections, Target
 from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import TargetShape
 
-__all__ = ["Calibration", "Uncertainty", "residuals_of", "rms"]
+__all__ = ["Calibration", "Candidate", "Uncertainty", "points_of", "residuals_of", "rms"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +43,30 @@ class Uncertainty:
         return {single: float(root) for name, root in zip(self.names, roots, strict=True) for single in name.split("=")}
 
 
+@dataclass(frozen=True)
+class Candidate:
+    """What a method tried: target shape and lens, held-out error with its standard error, pixels per point.
+
+    loses_px: its held-out error less that of the one that was taken.  NaN where no view could judge it.
+    """
+
+    target: str
+    lens: str
+    held_out_px: float
+    standard_error_px: float
+    loses_px: float
+
+
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """A camera with the evidence for it.
 
     camera_from_target: one pose for each of `detections.views`, in their order.  method, settings: what was called, so that it can be
     called again.  status: how the solver ended, a sentence.  steps: how many it took.  assumptions: what was taken for granted
-    because the data could not tell, each a sentence.
-    Raises InputError where poses and views do not match in number.
+    because the data could not tell, each a sentence.  target_shape: where the target's corners were found to be; flat
+    where nothing is said.  parameters: how many of camera and shape the data determined, a real number where priors shared in it.
+    candidates: what else was tried, simplest first.  free_camera: with the lens that no formula limits, where the camera's is a formula.
+    Raises InputError where poses and views, or the shape and the target, do not match in number.
     """
 
     camera: Camera
@@ -61,16 +78,33 @@ class Calibration:
     status: str
     steps: int
     version: str
-    assumptions: tuple[str, ...] = field(default=())
+    assumptions: tuple[str, ...] = ()
+    target_shape: TargetShape = None  # type: ignore[assignment]  # flat, made below for as many corners as there are
+    parameters: float = float("nan")  # the uncertainty's, where nothing is said
+    candidates: tuple[Candidate, ...] = ()
+    free_camera: Camera | None = None
 
     def __post_init__(self) -> None:
+        corners = len(self.detections.target.points)
+        if self.target_shape is None:
+            object.__setattr__(self, "target_shape", TargetShape.flat(corners))
+        elif len(self.target_shape.displacements) != corners:
+            raise InputError(f"a shape of {len(self.target_shape.displacements)} corners for a target of {corners}; expected one for each.")
+        if np.isnan(self.parameters):
+            object.__setattr__(self, "parameters", float(len(self.uncertainty.names)))
+        object.__setattr__(self, "candidates", tuple(self.candidates))
         object.__setattr__(self, "camera_from_target", tuple(self.camera_from_target))
         if len(self.camera_from_target) != len(self.detections.views):
             raise InputError(f"{len(self.camera_from_target)} poses for {len(self.detections.views)} views; expected one for each.")
 
     def residuals(self) -> tuple[Float[ndarray, "_ 2"], ...]:
         """Predicted minus detected, pixels, an array (n,2) for each view; the formula's own value where its domain has ended."""
-        return residuals_of(self.camera, self.camera_from_target, self.detections)
+        return residuals_of(self.camera, self.camera_from_target, self.detections, shape=self.target_shape)
+
+    @property
+    def target_points(self) -> Float[ndarray, "m 3"]:
+        """Where the target's corners are, metres, target frame: nominal points and what the shape adds."""
+        return points_of(self.detections.target, self.target_shape)
 
     @property
     def rms_px(self) -> float:
@@ -78,9 +112,16 @@ class Calibration:
         return rms(np.concatenate(self.residuals()))
 
 
-def residuals_of(camera: Camera, camera_from_target: Sequence[Pose], detections: Detections) -> tuple[Float[ndarray, "_ 2"], ...]:
+def points_of(target: Target, shape: TargetShape | None) -> Float[ndarray, "m 3"]:
+    """Where a target's corners are, metres, target frame; nominally where no shape is known."""
+    return target.points if shape is None else target.points + shape.displacements
+
+
+def residuals_of(
+    camera: Camera, camera_from_target: Sequence[Pose], detections: Detections, *, shape: TargetShape | None = None
+) -> tuple[Float[ndarray, "_ 2"], ...]:
     """Predicted minus detected, pixels, an array (n,2) for each view, for a camera and one pose for each view."""
-    points = detections.target.points
+    points = points_of(detections.target, shape)
     return tuple(
         camera.project(pose.apply(points[view.ids]), beyond=True) - view.pixels
         for pose, view in zip(camera_from_target, detections.views, strict=True)

@@ -1,7 +1,7 @@
 """The judge: error on photographs that a calibration has not seen.
 
-Floor 3.  Views are dealt into folds; the method is called again without a fold; on the fold's views the lens is fixed and only the pose is
-fitted.  Folds come from numpy's default_rng(seed), so the same data give the same folds.
+Floor 3.  Views are dealt into folds; the method is called again without a fold; on the fold's views the lens and the target's shape are
+fixed and only the pose is fitted.  Folds come from numpy's default_rng(seed), so the same data give the same folds.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from orthoscope.geometry.target import Detections
 from orthoscope.methods.calibration import Calibration, residuals_of
 from orthoscope.methods.resection import resect
 from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import TargetShape
 
-__all__ = ["FEWEST_VIEWS", "HeldOut", "folds_of_views", "held_out"]
+__all__ = ["FEWEST_VIEWS", "HeldOut", "folds_of_views", "held_out", "rms_and_error"]
 
 FEWEST_VIEWS = 4  # with fewer, a fold would leave a calibration that rests on assumptions
 
@@ -28,33 +29,46 @@ Refit = Callable[[Detections], Calibration]
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """For each view of the detections, in order: the camera that had not seen it, the view's pose there, its residuals (n,2).
+    """For each view of the detections, in order: the camera and the target's shape from other views, its pose there, its residuals (n,2).
 
-    None, None and NaN where there is no such camera.
+    None and NaN where there is no such camera.
     """
 
     cameras: tuple[Camera | None, ...]
+    shapes: tuple[TargetShape | None, ...]
     camera_from_target: tuple[Pose | None, ...]
     residuals: tuple[Float[ndarray, "_ 2"], ...]
 
     @property
     def rms_px(self) -> float:
         """Root mean square of |residual| over all held-out corners, pixels per point; NaN where there are none."""
-        squares = np.concatenate([(e * e).sum(-1) for e in self.residuals])
-        return float(np.sqrt(squares[np.isfinite(squares)].mean())) if np.isfinite(squares).any() else float("nan")
+        return self._rms_and_error[0]
 
     @property
     def standard_error_px(self) -> float:
         """Standard error of `rms_px`, taking views as independent draws."""
-        sums = np.array([(e * e).sum() for e in self.residuals])
-        corners = np.array([len(e) for e in self.residuals])[np.isfinite(sums)]
-        sums = sums[np.isfinite(sums)]
-        views = len(sums)
-        if views < 2:
-            return float("nan")
-        mean = sums.sum() / corners.sum()
-        of_mean = np.sqrt(views / (views - 1) * ((sums - corners * mean) ** 2).sum()) / corners.sum()
-        return float(of_mean / (2.0 * np.sqrt(mean))) if mean > 0 else 0.0
+        return self._rms_and_error[1]
+
+    @property
+    def _rms_and_error(self) -> tuple[float, float]:
+        return rms_and_error(np.array([(e * e).sum() for e in self.residuals]), np.array([len(e) for e in self.residuals]))
+
+
+def rms_and_error(squares: Float[ndarray, " m"], corners: Float[ndarray, " m"]) -> tuple[float, float]:
+    """Root mean square per point over views, and its standard error, views taken as independent draws.
+
+    squares: of each view the sum of |residual|^2, NaN where there is none; such views take no part.  corners: of each view.
+    """
+    known = np.isfinite(squares)
+    squares, corners = squares[known], corners[known]
+    views = len(squares)
+    if not views:
+        return float("nan"), float("nan")
+    mean = squares.sum() / corners.sum()
+    if views < 2 or not mean > 0:
+        return float(np.sqrt(mean)), float("nan") if views < 2 else 0.0
+    of_mean = np.sqrt(views / (views - 1) * ((squares - corners * mean) ** 2).sum()) / corners.sum()
+    return float(np.sqrt(mean)), float(of_mean / (2.0 * np.sqrt(mean)))
 
 
 def folds_of_views(views: int, folds: int, *, seed: int = 0) -> list[ndarray]:
@@ -84,6 +98,7 @@ def held_out(
     """
     views = len(detections.views)
     cameras: list[Camera | None] = [None] * views
+    shapes: list[TargetShape | None] = [None] * views
     poses: list[Pose | None] = [None] * views
     residuals = [np.full((len(view.ids), 2), np.nan) for view in detections.views]
     parts = folds_of_views(views, folds, seed=seed) if views >= FEWEST_VIEWS else []
@@ -91,21 +106,23 @@ def held_out(
     fits = run(_fold, [detections] * len(parts), [refit] * len(parts), parts)
     for done, (part, fit) in enumerate(zip(parts, fits, strict=True), 1):
         if fit is not None:
-            camera, fitted, errors = fit
+            known, fitted, errors = fit
             for i, pose, e in zip(part, fitted, errors, strict=True):
-                cameras[i], poses[i], residuals[i] = camera, pose, e
+                cameras[i], shapes[i], poses[i], residuals[i] = known.camera, known.target_shape, pose, e
         if progress:
             progress(done, len(parts))
-    return HeldOut(tuple(cameras), tuple(poses), tuple(residuals))
+    return HeldOut(tuple(cameras), tuple(shapes), tuple(poses), tuple(residuals))
 
 
-def _fold(detections: Detections, refit: Refit, part: Int[ndarray, " f"]) -> tuple[Camera, tuple[Pose, ...], tuple[ndarray, ...]] | None:
-    """Camera from the other views, poses and residuals of these; None where the others cannot tell."""
+def _fold(
+    detections: Detections, refit: Refit, part: Int[ndarray, " f"]
+) -> tuple[Calibration, tuple[Pose, ...], tuple[ndarray, ...]] | None:
+    """Calibration from the other views, poses and residuals of these; None where the others cannot tell."""
     others = np.setdiff1d(np.arange(len(detections.views)), part)
     tested = detections.only(part)
     try:
-        camera = refit(detections.only(others)).camera
-        poses = resect(camera, tested)
+        known = refit(detections.only(others))
+        poses = resect(known.camera, tested, shape=known.target_shape)
     except CalibrationError:
         return None
-    return camera, poses, residuals_of(camera, poses, tested)
+    return known, poses, residuals_of(known.camera, poses, tested, shape=known.target_shape)

@@ -19,7 +19,7 @@ from orthoscope.models.lens import Formula
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
 
-__all__ = ["FOCAL", "Pairs", "converted", "fit_lens", "fit_pairs"]
+__all__ = ["FOCAL", "Pairs", "about_principal_point", "converted", "fit_lens", "fit_pairs"]
 
 FOCAL = ("fx", "fy", "cx", "cy")
 
@@ -64,7 +64,7 @@ class Pairs:
 
 def fit_lens(rays: Float[ndarray, "n 3"], pixels: Float[ndarray, "n 2"], start: Camera, free: Sequence[str]) -> Solution[Camera]:
     """The camera near `start` that best takes each ray to its pixel, by least squares in pixels over the free parameters of K and lens."""
-    return solve(_about_principal_point(rays, pixels, free), start)
+    return solve(about_principal_point(rays, pixels, free), start)
 
 
 def converted(camera: Camera, lens: type[Formula], rays: Float[ndarray, "n 3"], *, free: Sequence[str] = ()) -> Camera:
@@ -74,7 +74,7 @@ def converted(camera: Camera, lens: type[Formula], rays: Float[ndarray, "n 3"], 
     Raises CalibrationError where the formula cannot see these rays.
     """
     starts = [replace(camera, lens=lens(**coefficients)) for coefficients in lens.starts]
-    return fit_pairs(_about_principal_point(rays, camera.project(rays), free or (*FOCAL, *lens.free)), starts).unknowns
+    return fit_pairs(about_principal_point(rays, camera.project(rays), free or (*FOCAL, *lens.free)), starts).unknowns
 
 
 def fit_pairs(problem: Pairs, starts: Sequence[Camera], *, loss: Loss | None = None, options: Options | None = None) -> Solution[Camera]:
@@ -94,7 +94,7 @@ def fit_pairs(problem: Pairs, starts: Sequence[Camera], *, loss: Loss | None = N
     )
 
 
-def _about_principal_point(rays: Float[ndarray, "n 3"], pixels: Float[ndarray, "n 2"], free: Sequence[str]) -> Pairs:
+def about_principal_point(rays: Float[ndarray, "n 3"], pixels: Float[ndarray, "n 2"], free: Sequence[str]) -> Pairs:
     """The problem of a camera whose lens stands about the principal point: free are parameters of K and coefficients."""
 
     def columns(camera, rays, free):

@@ -27,7 +27,7 @@ class Poses(NamedTuple):
     rotation: ndarray
     translation: ndarray
 
-    def only(self, rows: Int[ndarray, " v"]) -> Poses:
+    def only(self, rows: Int[ndarray, " v"] | slice) -> Poses:
         """The poses of these rows."""
         return Poses(self.rotation[rows], self.translation[rows])
 
@@ -67,10 +67,20 @@ class Observations:
         u[present], v[present] = pixels[:, 0], pixels[:, 1]
         return cls(order, counts, ids, u, v, present.astype(float))
 
+    @classmethod
+    def by_corner(cls, detections: Detections) -> Observations:
+        """The table with a column for each of the target's corners, views in their own order: sums over views are then sums of columns."""
+        views, corners = len(detections.views), len(detections.target.points)
+        seen = np.zeros((3, views, corners))
+        for row, view in enumerate(detections.views):
+            seen[:2, row, view.ids], seen[2, row, view.ids] = view.pixels.T, 1.0
+        ids = np.broadcast_to(np.arange(corners), (views, corners))
+        return cls(np.arange(views), np.full(views, corners), ids, *seen)
+
     @property
     def corners(self) -> int:
         """How many corners there are."""
-        return int(self.counts.sum())
+        return int(self.present.sum())
 
     def pixels(self) -> Float[ndarray, "m n 2"]:
         """The table's pixels, padding included."""
@@ -83,8 +93,16 @@ class Observations:
     def only(self, rows: Int[ndarray, " v"]) -> Observations:
         """The table of these rows (ascending)."""
         width = int(self.counts[rows].max())
-        table = (array[rows, :width] for array in (self.ids, self.u, self.v, self.present))
-        return Observations(self.order[rows], self.counts[rows], *table)
+        return Observations(self.order[rows], self.counts[rows], *(array[rows, :width] for array in self._columns()))
+
+    def thinned(self, corners: int) -> Observations:
+        """The same rows with at most so many corners each: the first in one shuffled order, the same every time."""
+        if self.counts.max(initial=0) <= corners:
+            return self
+        shuffled = np.random.default_rng(0).permutation(self.ids.shape[1])
+        first = np.argsort(self.present[:, shuffled] == 0, axis=1, kind="stable")[:, :corners]
+        table = (np.take_along_axis(array, shuffled[first], axis=1) for array in self._columns())
+        return Observations(self.order, np.minimum(self.counts, corners), *table)
 
     def chunks(self) -> list[Chunk]:
         """The table in pieces of about CHUNK corners."""
@@ -93,19 +111,30 @@ class Observations:
             width = int(self.counts[start])
             stop = min(len(self.order), start + max(1, CHUNK // max(width, 1)))
             rows = slice(start, stop)
-            full = self.counts[stop - 1] == width
-            cut = (np.ascontiguousarray(array[rows, :width]) for array in (self.ids, self.u, self.v, self.present))
-            ids, u, v, present = cut
-            pieces.append(Chunk(rows, ids, u, v, None if full else present))
+            ids, u, v, present = (np.ascontiguousarray(array[rows, :width]) for array in self._columns())
+            pieces.append(Chunk(rows, ids, u, v, None if present.all() else present))
             start = stop
         return pieces
 
     def poses_in_order(self, poses: Poses) -> tuple[Pose, ...]:
         """The poses of the table's rows as poses of the detections' views (made exactly orthonormal)."""
         back = np.argsort(self.order)
-        rotations = nearest_rotation(poses.rotation[back])
-        return tuple(Pose(rotation, translation) for rotation, translation in zip(rotations, poses.translation[back], strict=True))
+        stacks = nearest_rotation(poses.rotation[back]), poses.translation[back]
+        for stack in stacks:
+            stack.setflags(write=False)
+        return tuple(_trusted(rotation, translation) for rotation, translation in zip(*stacks, strict=True))
 
     def poses_of(self, poses: Sequence[Pose]) -> Poses:
         """Poses of the detections' views as rows of the table."""
         return Poses(np.array([poses[i].rotation for i in self.order]), np.array([poses[i].translation for i in self.order]))
+
+    def _columns(self) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+        """ids, u, v and present."""
+        return self.ids, self.u, self.v, self.present
+
+
+def _trusted(rotation: Float[ndarray, "3 3"], translation: Float[ndarray, "3"]) -> Pose:
+    """A pose without its check, which made one by one took a tenth of a calibration of 1000 views; these rotations are orthonormal."""
+    pose = object.__new__(Pose)
+    pose.__dict__.update(rotation=rotation, translation=translation)
+    return pose

@@ -23,10 +23,18 @@ from orthoscope.models.lens import Warp
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
 
-__all__ = ["Estimate", "Reprojection", "parameter_columns", "with_parameters"]
+__all__ = ["Estimate", "Places", "Reprojection", "parameter_columns", "with_parameters"]
 
 INTRINSICS = ("fx", "fy", "cx", "cy", "skew")
 POSE = 6
+
+
+class Places(NamedTuple):
+    """Corners of a chunk in the target's frame, metres, arrays that broadcast to (views, n); Z is None where all lie in the plane."""
+
+    X: ndarray
+    Y: ndarray
+    Z: ndarray | None
 
 
 class Estimate(NamedTuple):
@@ -48,9 +56,8 @@ class Reprojection:
         _check_free(camera, free)
         self.free = tuple(free)
         self._coefficients = _coefficients(free)
-        self._columns = [(i, single) for i, group in enumerate(free) for single in group.split("=")]
         self._chunks = observations.chunks()
-        self._plane = [(points[chunk.ids, 0], points[chunk.ids, 1]) for chunk in self._chunks]
+        self._places = [_places(points[chunk.ids]) for chunk in self._chunks]
         widest = max((chunk.u.size for chunk in self._chunks), default=0)
         self._buffer = np.empty((len(free) + POSE + 1) * 2 * widest)
         self._views = len(observations.order)
@@ -58,20 +65,17 @@ class Reprojection:
     def linearise(self, unknowns: Estimate, loss: Loss) -> NormalEquations:
         """The solver's sums at an estimate."""
         k, m = len(self.free), self._views
-        A, a, B = np.zeros((k, k)), np.zeros(k), np.empty((m, k, POSE))
-        C, c, cost = np.empty((m, POSE, POSE)), np.empty((m, POSE)), 0.0
+        gram, cost = np.empty((m, k + POSE + 1, k + POSE + 1)), 0.0
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            for chunk, plane in zip(self._chunks, self._plane, strict=True):
-                stacked = self._stack(unknowns, chunk, plane)
+            for chunk, places in zip(self._chunks, self._places, strict=True):
+                stacked = self.stack(unknowns, chunk, places)
                 squared = _squared(stacked[:, -1], chunk)
                 cost += float(loss.cost(squared).sum())
                 if (weight := loss.weight(squared)) is not None:
                     stacked *= np.sqrt(np.concatenate([weight, weight], axis=1))[:, None]
-                gram = stacked @ stacked.transpose(0, 2, 1)
-                A += gram[:, :k, :k].sum(0)
-                a += gram[:, :k, -1].sum(0)
-                B[chunk.rows], C[chunk.rows], c[chunk.rows] = gram[:, :k, k:-1], gram[:, k:-1, k:-1], gram[:, k:-1, -1]
-        return NormalEquations(cost, A, a, B, C, c)
+                np.matmul(stacked, stacked.transpose(0, 2, 1), out=gram[chunk.rows])
+        shared = gram[:, :k].sum(0)
+        return NormalEquations(cost, shared[:, :k], shared[:, -1], gram[:, :k, k:-1], gram[:, k:-1, k:-1], gram[:, k:-1, -1])
 
     def move(self, unknowns: Estimate, shared: Float[ndarray, " k"], views: Float[ndarray, "m 6"]) -> Estimate:
         """The estimate after a step."""
@@ -84,20 +88,25 @@ class Reprojection:
         width = max(chunk.u.shape[1] for chunk in self._chunks)
         out = np.zeros((self._views, width, 2))
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            for chunk, plane in zip(self._chunks, self._plane, strict=True):
-                row = self._stack(estimate, chunk, plane)[:, -1]
+            for chunk, places in zip(self._chunks, self._places, strict=True):
+                row = self.stack(estimate, chunk, places)[:, -1]
                 n = chunk.u.shape[1]
                 out[chunk.rows, :n, 0], out[chunk.rows, :n, 1] = row[:, :n], row[:, n:]
         return out
 
-    def _stack(self, estimate: Estimate, chunk: Chunk, plane: tuple[ndarray, ndarray]) -> ndarray:
-        """(views, columns, 2 n): d/d shared, d/d pose, residual; first n of a row for u, the others for v."""
+    def stack(self, estimate: Estimate, chunk: Chunk, places: Places) -> ndarray:
+        """(views, columns, 2 n): d/d shared, d/d pose, residual; first n of a row for u, the others for v.
+
+        places: of the chunk's corners in the target's frame.  The array is the problem's own and is written again by the next call.
+        """
         camera, poses = estimate
         frame = camera.lens_frame or camera.intrinsics
         turn = None if camera.lens_frame is None else np.linalg.solve(frame.matrix, camera.intrinsics.matrix)
         rotation, translation = poses.rotation[chunk.rows, :, :, None], poses.translation[chunk.rows, :, None]
-        X, Y = plane
+        X, Y, Z = places
         q = [rotation[:, i, 0] * X + rotation[:, i, 1] * Y for i in range(3)]
+        if Z is not None:
+            q = [q[i] + rotation[:, i, 2] * Z for i in range(3)]
         P = [q[i] + translation[:, i] for i in range(3)]
         if turn is not None:
             P = [turn[i, 0] * P[0] + turn[i, 1] * P[1] + turn[i, 2] * P[2] for i in range(3)]
@@ -107,10 +116,9 @@ class Reprojection:
         views, n = chunk.u.shape
         k = len(self.free)
         stacked = self._buffer[: views * (k + POSE + 1) * 2 * n].reshape(views, k + POSE + 1, 2 * n)
-        stacked[:, :k] = 0.0
         by_lens = dict(zip(self._coefficients, at.by, strict=True))
-        for i, name in self._columns:
-            _add_parameter(stacked[:, i, :n], stacked[:, i, n:], name, at.x, at.y, frame, by_lens)
+        for i, group in enumerate(self.free):
+            _set_parameter(stacked[:, i, :n], stacked[:, i, n:], group, at, frame, by_lens)
         for half, predicted, seen, slopes in zip(
             (slice(None, n), slice(n, None)), _pixels(at, frame), (chunk.u, chunk.v), _pixels_by_place(at, frame), strict=True
         ):
@@ -120,6 +128,12 @@ class Reprojection:
             absent = np.concatenate([chunk.present, chunk.present], axis=1) == 0
             np.copyto(stacked, 0.0, where=absent[:, None])
         return stacked
+
+
+def _places(points: Float[ndarray, "v n 3"]) -> Places:
+    """Corners by coordinate."""
+    X, Y, Z = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
+    return Places(X, Y, Z if Z.any() else None)
 
 
 def _check_free(camera: Camera, free: Sequence[str]) -> None:
@@ -139,7 +153,8 @@ def with_parameters(camera: Camera, free: Sequence[str], step: Float[ndarray, " 
     for name in INTRINSICS:
         moved = values[name] + steps.pop(name, 0.0)
         values[name] = 0.5 * values[name] if name in ("fx", "fy") and not moved > 0 else moved
-    moved_lens = {name: getattr(camera.lens, name) + length for name, length in steps.items()}
+    coefficients = dict(zip(camera.lens.names(), camera.lens.coefficients.tolist(), strict=True))
+    moved_lens = {name: coefficients[name] + length for name, length in steps.items()}
     return replace(camera, intrinsics=Intrinsics(**values), lens=camera.lens.with_coefficients(**moved_lens))
 
 
@@ -148,10 +163,9 @@ def parameter_columns(camera: Camera, x: ndarray, y: ndarray, free: Sequence[str
     frame, wanted = camera.lens_frame or camera.intrinsics, _coefficients(free)
     at = camera.lens.linearise(x, y, wanted)
     by_lens = dict(zip(wanted, at.by, strict=True))
-    columns = np.zeros((len(free), 2, x.size))
+    columns = np.empty((len(free), 2, x.size))
     for column, group in zip(columns, free, strict=True):
-        for name in group.split("="):
-            _add_parameter(column[0], column[1], name, at.x, at.y, frame, by_lens)
+        _set_parameter(column[0], column[1], group, at, frame, by_lens)
     return columns, np.stack(_pixels(at, frame))
 
 
@@ -180,25 +194,31 @@ def _pixels_by_place(at: Warp, frame: Intrinsics) -> tuple[tuple[ndarray, ndarra
     return (u_x, u_y), (frame.fy * at.j_yx, frame.fy * at.j_yy)
 
 
-def _add_parameter(u: ndarray, v: ndarray, name: str, x_d: ndarray, y_d: ndarray, frame: Intrinsics, by_lens) -> None:
-    """Adds d(u, v) by one parameter to the two halves of a column."""
+def _set_parameter(u: ndarray, v: ndarray, group: str, at: Warp, frame: Intrinsics, by_lens: dict[str, tuple[ndarray, ndarray]]) -> None:
+    """Writes d(u, v) by one parameter, or by those that are tied in a group, into the two halves of a column."""
+    first, *others = (_slopes(name, at, frame, by_lens) for name in group.split("="))
+    u[...], v[...] = first
+    for by_u, by_v in others:
+        u += by_u
+        v += by_v
+
+
+def _slopes(name: str, at: Warp, frame: Intrinsics, by_lens: dict[str, tuple[ndarray, ndarray]]) -> tuple[ndarray | float, ndarray | float]:
+    """d(u, v) by one parameter, numbers where it is the same everywhere."""
     match name:
         case "fx":
-            u += x_d
+            return at.x, 0.0
         case "fy":
-            v += y_d
+            return 0.0, at.y
         case "cx":
-            u += 1.0
+            return 1.0, 0.0
         case "cy":
-            v += 1.0
+            return 0.0, 1.0
         case "skew":
-            u += y_d
-        case _:
-            dx, dy = by_lens[name]
-            u += frame.fx * dx
-            if frame.skew:
-                u += frame.skew * dy
-            v += frame.fy * dy
+            return at.y, 0.0
+    x, y = by_lens[name]
+    along = frame.fx * x
+    return along + frame.skew * y if frame.skew else along, frame.fy * y
 
 
 def _set_pose(columns: ndarray, g: tuple[ndarray, ndarray, ndarray], q: list[ndarray], turn: ndarray | None) -> None:

@@ -10,18 +10,20 @@ import numpy as np
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Detections
+from orthoscope.methods.calibration import points_of
 from orthoscope.methods.closed_form import poses_of_camera
 from orthoscope.methods.observations import Observations
 from orthoscope.methods.reprojection import Estimate, Reprojection
 from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import TargetShape
 from orthoscope.solve.least_squares import Status, solve
 from orthoscope.solve.losses import Loss
 
 __all__ = ["resect"]
 
 
-def resect(camera: Camera, detections: Detections, *, loss: Loss | None = None) -> tuple[Pose, ...]:
-    """camera_from_target of each view, by least squares over its corners with the camera fixed.
+def resect(camera: Camera, detections: Detections, *, shape: TargetShape | None = None, loss: Loss | None = None) -> tuple[Pose, ...]:
+    """camera_from_target of each view, by least squares over its corners with the camera (and the target's shape) fixed.
 
     Raises CalibrationError where a view has fewer than four corners inside the lens's domain.
     """
@@ -33,7 +35,7 @@ def resect(camera: Camera, detections: Detections, *, loss: Loss | None = None) 
         raise CalibrationError(
             f"view {name!r} has fewer than 4 corners where this camera sees anything. Leave it out, or use the right camera."
         )
-    problem = Reprojection(observations, detections.target.points, camera)
+    problem = Reprojection(observations, points_of(detections.target, shape), camera)
     solution = solve(problem, Estimate(camera, poses), loss=loss)
     if solution.status is Status.NO_COST:
         raise CalibrationError("the target lies behind this camera in some view. Use the camera that took the photographs.")

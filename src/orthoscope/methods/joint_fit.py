@@ -1,0 +1,126 @@
+"""Step 1 of `decoupled`: poses, the target's shape and the lens together, from a calibration with a flat target.
+
+Floor 3.  Each round minimises the joint problem (joint.py) for the weights at hand and finds the weights anew (evidence.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.methods.calibration import Calibration
+from orthoscope.methods.evidence import Evidence, first_guess
+from orthoscope.methods.joint import Joint, JointEstimate
+from orthoscope.methods.joint_sums import SPACE, Measurements
+from orthoscope.methods.observations import Observations
+from orthoscope.models.camera import Camera
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.spline import Displacement, Lattice
+from orthoscope.models.target_shape import polynomials
+from orthoscope.solve.least_squares import Options, solve
+from orthoscope.solve.losses import Huber
+
+__all__ = ["FORMULA", "FREE", "JointFit", "fit_jointly"]
+
+FREE, FORMULA = "free", "formula"  # the lens of step 1: a displacement over a formula, or the formula alone
+
+ROUNDS = 6
+COARSE, FINE = 1e-3, 1e-9  # tolerances of a round and of the last
+FAR = 4.0  # standard deviations of a coordinate: independent errors reach so far once in 3000, and count less beyond
+CELLS = 8  # of the displacement's lattice along the image's longer side
+MARGIN = 0.05  # of the image's sides, by which the lattice is larger
+REACH = 0.67  # of the image's half diagonal: the range of the displacement's prior; from half to twice this the held-out error is the same
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """What came out: the problem with its last weights, the estimate, covariance (k,k) of the free parameters, steps and status."""
+
+    problem: Joint
+    estimate: JointEstimate
+    evidence: Evidence
+    covariance: Float[ndarray, "k k"]
+    steps: int
+    status: str
+
+    @property
+    def far_px(self) -> float:
+        """Errors count less from here on, pixels."""
+        return FAR * float(np.sqrt(self.evidence.noise))
+
+    def with_formula(self, camera: Camera, free: Sequence[str]) -> tuple[Float[ndarray, "k k"], float]:
+        """For another camera in the place of the estimate's: covariance of its free parameters, and how many the data determine in all."""
+        problem = self.problem
+        measurements = Measurements(problem.measurements.observations, camera, free, problem.measurements.trust)
+        other = Joint(
+            measurements, problem.points, free,
+            surface=problem.surface, energy=np.zeros((0, 0)), single=problem.single, precisions=problem.precisions,
+        )  # fmt: skip
+        known = other.known(other.linearise(self.estimate._replace(camera=camera), Huber(self.far_px)))
+        return self.evidence.noise * known.camera, len(free) + float(known.surface.sum() + known.singles.sum())
+
+    @property
+    def displacements(self) -> Float[ndarray, "p 3"]:
+        """Of the target's corners, metres."""
+        return self.problem.corners(self.estimate) - self.problem.points
+
+
+def fit_jointly(
+    flat: Calibration,
+    *,
+    target: str,
+    through: str,
+) -> JointFit:
+    """Camera, poses and shape together.
+
+    flat: a calibration of a flat target to start from; its parameters are freed.  target: `flat`, `smooth` or `free`.  through: FREE or
+    FORMULA, the lens.
+    """
+    detections, free = flat.detections, flat.uncertainty.names
+    camera = _with_displacement(flat.camera) if through == FREE else flat.camera
+    observations = Observations.by_corner(detections)
+    points, seen = detections.target.points, observations.present.max(0) > 0
+    basis = polynomials(points, seen) if target != "flat" else np.zeros((len(points), 0))
+    energy = _energy(camera)
+    measurements = Measurements(observations, camera, free, np.ones(len(observations.order)))
+    estimate = JointEstimate(
+        camera, observations.poses_of(flat.camera_from_target), np.zeros((basis.shape[1], SPACE)), np.zeros((len(points), SPACE))
+    )
+    evidence = first_guess(0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), camera.intrinsics.fx)
+    steps, settled = 0, False
+    for round_ in range(ROUNDS):
+        last = settled or round_ == ROUNDS - 1
+        precisions = evidence.precisions(basis.shape[1])
+        problem = Joint(measurements, points, free, surface=basis, energy=energy, single=target == "free", precisions=precisions)
+        options = Options(tolerance=FINE if last else COARSE, max_steps=50)
+        solution = solve(problem, estimate, loss=Huber(FAR * np.sqrt(evidence.noise)), options=options)
+        estimate, steps = solution.unknowns, steps + solution.steps
+        known = problem.known(solution.sums)
+        renewed = evidence.renewed(problem, estimate, solution.cost, known)
+        if last:
+            return JointFit(problem, estimate, renewed, renewed.noise * known.camera, steps, solution.status.value)
+        settled = renewed.agrees_with(evidence)
+        evidence = renewed
+    raise AssertionError("the last round returns")
+
+
+def _with_displacement(camera: Camera) -> Camera:
+    """The camera with a displacement of nothing over its image, a margin included."""
+    frame = camera.lens_frame or camera.intrinsics
+    width, height = camera.image_size
+    low, high = frame.to_plane(np.array([[-MARGIN * width, -MARGIN * height], [(1 + MARGIN) * width, (1 + MARGIN) * height]]))
+    longer = max(width, height)
+    cells = (max(1, round(CELLS * width / longer)), max(1, round(CELLS * height / longer)))
+    lattice = Lattice.over(low, high, cells)
+    return replace(camera, lens=FreeLens(camera.lens, Displacement(lattice, np.zeros((lattice.splines, 2)))))
+
+
+def _energy(camera: Camera) -> Float[ndarray, "g g"]:
+    if not isinstance(camera.lens, FreeLens):
+        return np.zeros((0, 0))
+    lattice = camera.lens.over.lattice
+    sides = lattice.step * (np.array(lattice.shape) - 3)
+    return lattice.energy(REACH * 0.5 * float(np.hypot(*sides)))

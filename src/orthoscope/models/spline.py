@@ -1,0 +1,143 @@
+"""A displacement of the plane by bicubic B-splines: smooth everywhere, zero away from its lattice.
+
+Floor 1.  s(x, y) = sum over i, j of B((x - x_0) / h_x - i) B((y - y_0) / h_y - j) c_ij with the uniform cubic B-spline B, whose
+four pieces on a cell are the WEIGHTS below (C. de Boor, A Practical Guide to Splines, 1978).  Coefficients outside the lattice are
+zero, so s falls to zero within three cells of its border, twice continuously differentiable all the way.
+
+How rough a displacement is, for a range l beyond which its values have nothing to say about each other:
+    energy = integral of  s^2 / l^4 + 2 |grad s|^2 / l^2 + |second derivatives|^2,
+a Matern prior (F. Lindgren, H. Rue, J. Lindstrom, An explicit link between Gaussian fields and Gaussian Markov random fields, 2011):
+smooth where there are data, back to zero where there are none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
+
+__all__ = ["Displacement", "Lattice"]
+
+ACROSS = 4  # splines that are not zero on a cell, in each direction
+# the four pieces of the cubic B-spline on a cell as polynomials in t = 0..1, lowest power first
+WEIGHTS = np.array([[1.0, -3.0, 3.0, -1.0], [4.0, 0.0, -6.0, 3.0], [1.0, 3.0, 3.0, -3.0], [0.0, 0.0, 0.0, 1.0]]).T / 6.0
+NODES = 4  # of Gauss and Legendre: exact for the squares of cubics
+
+
+class Cell(NamedTuple):
+    """Where places lie in one direction: the first of the four splines there, their values (n,4) and slopes (n,4)."""
+
+    first: ndarray
+    values: ndarray
+    slopes: ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Where the splines stand: origin (2,) is the corner of the first cell, step (2,) a cell's size, shape how many splines in x, in y.
+
+    Raises InputError for fewer than four splines in a direction or a cell without size.
+    """
+
+    origin: ndarray
+    step: ndarray
+    shape: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "origin", frozen(self.origin, (2,), "lattice: origin"))
+        object.__setattr__(self, "step", frozen(self.step, (2,), "lattice: step"))
+        object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
+        if min(self.shape) < ACROSS or not (self.step > 0).all():
+            raise InputError(
+                f"a lattice of {self.shape} splines with steps {self.step} is none; expected at least 4 each way, steps above 0."
+            )
+
+    @classmethod
+    def over(cls, low: Float[ndarray, " 2"], high: Float[ndarray, " 2"], cells: tuple[int, int]) -> Lattice:
+        """The lattice whose splines make every bicubic function of so many cells over the rectangle from low to high."""
+        low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+        return cls(low, (high - low) / cells, (cells[0] + ACROSS - 1, cells[1] + ACROSS - 1))
+
+    @property
+    def splines(self) -> int:
+        """How many there are."""
+        return self.shape[0] * self.shape[1]
+
+    def design(self, x: ndarray, y: ndarray) -> ndarray:
+        """The value of every spline at places of any shape (...): (..., splines), y-major."""
+        across, down = self._cell(x, 0), self._cell(y, 1)
+        outer = (*x.shape, self.shape[1] + 2 * ACROSS, self.shape[0] + 2 * ACROSS)
+        padded = np.zeros((x.size, outer[-2], outer[-1]))
+        rows, four = np.arange(x.size)[:, None, None], np.arange(ACROSS)
+        padded[rows, down.first.reshape(-1, 1, 1) + four[:, None], across.first.reshape(-1, 1, 1) + four] = down.values.reshape(
+            -1, ACROSS, 1
+        ) * across.values.reshape(-1, 1, ACROSS)
+        return padded[:, ACROSS:-ACROSS, ACROSS:-ACROSS].reshape(*x.shape, self.splines)
+
+    def _cell(self, places: ndarray, axis: int) -> Cell:
+        """first counts splines from ACROSS before the lattice's own, where all coefficients are zero."""
+        t = (np.nan_to_num(places) - self.origin[axis]) / self.step[axis] + ACROSS
+        first = np.clip(np.floor(t), 0, self.shape[axis] + ACROSS)
+        t = np.clip(t - first, 0.0, 1.0)
+        powers = np.stack([np.ones_like(t), t, t * t, t * t * t], axis=-1)
+        slopes = powers[..., :3] @ (WEIGHTS[1:] * np.arange(1.0, 4.0)[:, None]) / self.step[axis]
+        return Cell(first.astype(np.int64), powers @ WEIGHTS, slopes)
+
+    def energy(self, reach: float) -> Float[ndarray, "g g"]:
+        """The matrix E of the roughness c'Ec, in the module's words; reach: its range l, in the plane's unit.
+
+        Scaled so that a displacement drawn from exp(-c'Ec / 2) has about unit variance in the middle of the lattice.
+        """
+        (x0, x1, x2), (y0, y1, y2) = (_grams(self.shape[axis], float(self.step[axis])) for axis in (0, 1))
+        energy = np.kron(y0, x0) / reach**4 + 2.0 / reach**2 * (np.kron(y0, x1) + np.kron(y1, x0))
+        energy += np.kron(y0, x2) + 2.0 * np.kron(y1, x1) + np.kron(y2, x0)
+        middle = self.origin + 0.5 * self.step * (np.array(self.shape) - ACROSS + 1)
+        there = self.design(middle[:1], middle[1:])[0]
+        return energy * float(there @ np.linalg.solve(energy, there))
+
+
+@dataclass(frozen=True, eq=False)
+class Displacement:
+    """s(x, y): how places of a plane are moved.  coefficients: (splines, 2), of x and of y, in the plane's unit."""
+
+    lattice: Lattice
+    coefficients: ndarray = field()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", frozen(self.coefficients, (self.lattice.splines, 2), "displacement: coefficients"))
+
+    @cached_property
+    def _padded(self) -> ndarray:
+        """(rows, columns, 2) with ACROSS zeros on every side."""
+        columns, rows = self.lattice.shape
+        return np.pad(self.coefficients.reshape(rows, columns, 2), ((ACROSS, ACROSS), (ACROSS, ACROSS), (0, 0)))
+
+    def at(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray, ndarray]:
+        """s, ds/dx and ds/dy at places of any shape (...), each (..., 2)."""
+        across, down = self.lattice._cell(x, 0), self.lattice._cell(y, 1)
+        four = np.arange(ACROSS)
+        near = self._padded[down.first[..., None, None] + four[:, None], across.first[..., None, None] + four]  # (..., 4 down, 4 across, 2)
+        in_rows = (across.values[..., None, None, :] @ near)[..., 0, :]
+        slopes_in_rows = (across.slopes[..., None, None, :] @ near)[..., 0, :]
+        by_rows, by_slopes = down.values[..., None, :], down.slopes[..., None, :]
+        return (by_rows @ in_rows)[..., 0, :], (by_rows @ slopes_in_rows)[..., 0, :], (by_slopes @ in_rows)[..., 0, :]
+
+
+def _grams(splines: int, step: float) -> tuple[ndarray, ndarray, ndarray]:
+    """Integrals over the lattice's cells of products of two splines, of their slopes, of their second derivatives."""
+    nodes, shares = np.polynomial.legendre.leggauss(NODES)
+    powers = np.vander(0.5 * (nodes + 1.0), 4, increasing=True)
+    grams = []
+    for order in range(3):
+        derived = np.polynomial.polynomial.polyder(WEIGHTS, order)
+        values = powers[:, : len(derived)] @ derived / step**order
+        piece = values.T @ (0.5 * step * shares[:, None] * values)
+        gram = np.zeros((splines, splines))
+        for first in range(splines - ACROSS + 1):
+            gram[first : first + ACROSS, first : first + ACROSS] += piece
+        grams.append(gram)
+    return grams[0], grams[1], grams[2]

@@ -1,0 +1,63 @@
+"""Where a target's corners really are: printed targets are stretched, bent and wavy.
+
+Floor 1.  The corners of a target are at its nominal points plus displacements, metres, in the target's frame.  A similarity would only
+move, turn or scale the whole target, which its poses (and the unit of length) do already: displacements have none.
+`flat` trusts the target; `smooth` is a surface of low order, in-plane scale and shear included; `free` gives each corner its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
+
+__all__ = ["SHAPES", "TargetShape", "polynomials"]
+
+SHAPES = ("flat", "smooth", "free")
+ORDERS = (1, 2, 3, 4)  # of a smooth surface: a sheet that was stretched, hangs or curls; waves are for single corners
+
+
+@dataclass(frozen=True, eq=False)
+class TargetShape:
+    """kind: one of SHAPES.  displacements: (m,3) metres, target frame, from nominal to real; 0 for corners that were never seen.
+
+    Raises InputError for another kind, or a flat target whose corners are displaced.
+    """
+
+    kind: str
+    displacements: ndarray
+
+    def __post_init__(self) -> None:
+        if self.kind not in SHAPES:
+            raise InputError(f"target shape {self.kind!r} is not known; expected one of {', '.join(SHAPES)}.")
+        object.__setattr__(self, "displacements", frozen(self.displacements, (None, 3), "target shape: displacements"))
+        if self.kind == "flat" and self.displacements.any():
+            raise InputError("a flat target's corners are displaced; expected displacements of 0, or the shape smooth or free.")
+
+    @classmethod
+    def flat(cls, corners: int) -> TargetShape:
+        """The target as it is said to be."""
+        return cls("flat", np.zeros((corners, 3)))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the displacements' lengths, metres, over the corners that have one."""
+        squared = (self.displacements**2).sum(1)
+        return float(np.sqrt(squared[squared > 0].mean())) if squared.any() else 0.0
+
+
+def polynomials(points: Float[ndarray, "m 3"], seen: ndarray, *, orders: Sequence[int] = ORDERS) -> Float[ndarray, "m r"]:
+    """Polynomials of the target's plane, orthogonal over the seen corners and of mean square 1 there; 0 at corners that were not seen.
+
+    seen: (m,) bool.  orders: which are wanted.  Fewer where the seen corners cannot tell them apart.
+    """
+    plane = points[:, :2] - points[seen, :2].mean(0)
+    x, y = (plane / np.abs(plane[seen]).max()).T
+    order = np.array([i for i in range(max(orders) + 1) for _ in range(i + 1)])
+    powers = np.stack([x ** (i - j) * y**j for i in range(max(orders) + 1) for j in range(i + 1)], axis=1) * seen[:, None]
+    r = np.linalg.qr(powers, mode="r")
+    told = np.abs(np.diag(r)) > 1e-6 * np.sqrt(seen.sum())
+    return (powers @ np.linalg.pinv(r))[:, told & np.isin(order, orders)] * np.sqrt(seen.sum())
