@@ -56,6 +56,20 @@ def test_robust_minima_are_those_of_scipy(loss):
 
 
 @for_every_shape
+def test_trusting_its_last_step_it_saves_the_sums_there_and_ends_where_it_ends_otherwise(shape):
+    problem, formed = Blocks(*shape, rows=30), []
+    linearise = problem.linearise
+    problem.linearise = lambda unknowns, loss: formed.append(unknowns) or linearise(unknowns, loss)
+    lowest = solve(problem, problem.start, options=Options(tolerance=1e-13)).cost
+    formed.clear()
+    trusting = solve(problem, problem.start, options=Options(tolerance=1e-9, trusting=True))
+    assert trusting.status is Status.CONVERGED
+    assert len(formed) == trusting.steps  # the start's and one for each step but the last
+    assert linearise(trusting.unknowns, Linear()).cost <= lowest * (1.0 + 2e-9)  # twice the tolerance: the rate of shrinking drifts
+    assert_allclose(trusting.cost, lowest, rtol=1e-5)  # as that step promised
+
+
+@for_every_shape
 @pytest.mark.parametrize(("damp", "damping"), [("diagonal", 1e-6), ("diagonal", 0.7), ("identity", 1e-6), ("identity", 5.0)])
 def test_eliminating_the_views_gives_the_dense_step(shape, damp, damping):
     problem = Blocks(*shape, rows=20, bend=0.0)  # linear, so the first step is always taken
@@ -110,6 +124,25 @@ def test_cauchy_resists_gross_errors():
     robust = np.abs(solve(spoilt, spoilt.start, loss=Cauchy(0.03)).unknowns.shared - truth).max()
     assert plain > 0.1
     assert robust < 0.005  # noise / sqrt(rows of all views) is 0.001
+
+
+class Valley:
+    """x + y = 1 against x - y = 500, seen through 1e-4, beside a residual of 1 that nothing moves: y - x hardly matters, but it does."""
+
+    J, b = np.array([[1.0, 1.0], [1e-4, -1e-4], [0.0, 0.0]]), np.array([1.0, 0.05, 1.0])
+
+    def linearise(self, unknowns, loss):
+        e = self.J @ unknowns - self.b
+        return NormalEquations(float(e @ e), self.J.T @ self.J, self.J.T @ e, np.empty((0, 2, 0)), np.empty((0, 0, 0)), np.empty((0, 0)))
+
+    def move(self, unknowns, shared, views):
+        return unknowns + shared
+
+
+def test_it_does_not_trust_a_promise_that_only_damping_made_small():
+    found = solve(Valley(), np.zeros(2), options=Options(tolerance=1e-6, trusting=True))
+    assert found.status is Status.CONVERGED
+    assert_allclose(found.unknowns, [250.5, -249.5], rtol=0.02)  # 1e-6 of a cost of 1, by the slope of 1e-4, is 10 on y - x
 
 
 class Cliff:

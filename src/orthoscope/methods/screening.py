@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from math import hypot
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def _off_a_line(points: Float[ndarray, "n 2"]) -> int:
 
 def _thin(pixels: Float[ndarray, "n 2"]) -> bool:
     """Whether pixels are all but on a line, or all at one place."""
-    x, y = (pixels - pixels.mean(0)).T
-    xx, xy, yy = x @ x, x @ y, y @ y
-    longest = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)  # the larger eigenvalue; their product is the determinant
-    return bool(xx * yy - xy * xy <= THINNEST**2 * longest * longest)
+    offsets = pixels - pixels.sum(0) / len(pixels)
+    (xx, xy), (_, yy) = (offsets.T @ offsets).tolist()
+    longest = 0.5 * (xx + yy) + hypot(0.5 * (xx - yy), xy)  # the larger eigenvalue; their product is the determinant
+    return xx * yy - xy * xy <= THINNEST**2 * longest * longest

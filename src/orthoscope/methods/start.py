@@ -174,8 +174,10 @@ def _equidistant(image_size: tuple[int, int], focal: float) -> Camera:
 
 def _misfit(estimate: Estimate, observations: Observations, points: Float[ndarray, "p 3"]) -> float:
     """rms, pixels, of the corners about where the camera sees the target; infinite where it sees some corner nowhere."""
-    e = Reprojection(observations, points, estimate.camera).residuals(estimate)
-    misfit = float(np.sqrt((e * e).sum() / observations.corners))
+    camera, (rotation, translation) = estimate
+    seen = points[observations.ids] @ rotation.transpose(0, 2, 1) + translation[:, None]
+    e = camera.project(seen.reshape(-1, 3), beyond=True) - observations.pixels().reshape(-1, 2)
+    misfit = float(np.sqrt((e * e).sum(1)[observations.present.ravel() > 0].mean()))
     return misfit if np.isfinite(misfit) else np.inf
 
 

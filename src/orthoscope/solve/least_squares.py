@@ -72,7 +72,9 @@ class Options:
     """How to solve.
 
     tolerance: stop when a step promises to lower the cost by no more than this share of it.  floor: or by no more than this, absolutely,
-    in the residual's unit squared (noise-free data).  damping: lambda at the start.  damp: "diagonal" or "identity".
+    in the residual's unit squared (noise-free data).  damping: lambda at the start.  damp: "diagonal" or "identity".  trusting: whether the
+    last step, known by how promises shrink, is taken without forming the sums after it; the solution's are then those before it, and its
+    cost is what that step promised.
     progress: called after each step that lowered the cost, with (step, cost).
     Raises InputError where damp is another word.
     """
@@ -82,6 +84,7 @@ class Options:
     floor: float = 1e-18
     damping: float = 1e-6
     damp: str = "diagonal"
+    trusting: bool = False
     progress: Callable[[int, float], None] | None = None
 
     def __post_init__(self) -> None:
@@ -110,19 +113,23 @@ def solve(problem: Problem[Unknowns], start: Unknowns, *, loss: Loss | None = No
     here, sums = start, problem.linearise(start, loss)
     if not np.isfinite(sums.cost):
         return Solution(here, sums, 0, Status.NO_COST)
-    damping, steps = _Damping(options.damping), 0
+    damping, steps, before = _Damping(options.damping), 0, 0.0
     while True:
         shared, views, promised = _damped_step(sums, damping.value, options.damp)
         if status := _ending(sums, promised, damping.value, steps, options):
             return Solution(here, sums, steps, status)
         steps += 1
+        if options.trusting and (last := _last_step(sums, promised, before, options)):
+            shared, views, promised = last
+            return Solution(problem.move(here, shared, views), _lowered(sums, promised), steps, Status.CONVERGED)
+        before = 0.0
         there, trial, gained = here, sums, -np.inf
         if 0.0 < promised < np.inf:
             there = problem.move(here, shared, views)
             trial = problem.linearise(there, loss)
             gained = sums.cost - trial.cost  # NaN or -inf where there is no solution
         if gained >= 0.0:
-            here, sums = there, trial
+            here, sums, before = there, trial, promised
             damping.loosen(gained / promised)
             if options.progress:
                 options.progress(steps, sums.cost)
@@ -179,6 +186,23 @@ def _ending(sums: NormalEquations, promised: float, damping: float, steps: int, 
 def _is_little(promised: float, sums: NormalEquations, options: Options) -> bool:
     """Whether a promised reduction of the cost is not worth a step."""
     return abs(promised) <= options.tolerance * sums.cost + options.floor
+
+
+def _last_step(sums: NormalEquations, promised: float, before: float, options: Options) -> tuple[ndarray, ndarray, float] | None:
+    """The undamped step, where promises that go on shrinking as they have since the step `before` are little after it; else None."""
+
+    def is_last(promised: float) -> bool:
+        return 0.0 < promised < before and _is_little(promised * promised / before, sums, options)
+
+    if not is_last(promised):
+        return None
+    step = _damped_step(sums, LEAST_DAMPING, options.damp)  # in a flat valley it is the damping that makes a promise small
+    return step if is_last(step[2]) else None
+
+
+def _lowered(sums: NormalEquations, promised: float) -> NormalEquations:
+    """The sums with the cost that was promised."""
+    return sums._replace(cost=max(sums.cost - promised, 0.0))
 
 
 def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndarray, ndarray, float]:
