@@ -51,6 +51,31 @@ def test_unproject_inverts_project_for_every_lens(lens):
     assert_allclose(Camera(SIZE, INTRINSICS, lens).unproject(pixels[seen]), rays[seen], atol=1e-11)  # rounding of 500 px and more
 
 
+@for_every_lens
+def test_pixels_all_over_a_large_image_come_back_to_a_billionth(lens):
+    size, centre = (4000, 3000), np.array([2000.0, 1500.0])
+    camera = Camera(size, Intrinsics(2400.0, 2400.0, *centre), lens)
+    pixels = np.random.default_rng(0).uniform([0.0, 0.0], size, (40_000, 2))  # several blocks
+    rays = camera.unproject(pixels)
+    seen = np.isfinite(rays).all(axis=1)
+    assert seen.mean() > 0.05
+    assert_allclose(camera.project(rays[seen], beyond=True), pixels[seen], atol=1e-9)
+
+
+@pytest.mark.parametrize("lens", [FOLDING, Brown(k1=-0.5, p1=1e-3, p2=-2e-3), KannalaBrandt(k1=-0.2)], ids=["brown", "decentred", "angle"])
+def test_of_many_pixels_those_past_the_fold_have_no_ray(lens):
+    camera = Camera((2000, 1500), Intrinsics(1000.0, 1000.0, 1000.0, 750.0), lens)
+    pixels = np.random.default_rng(0).uniform([0.0, 0.0], (2000, 1500), (40_000, 2))
+    seen = np.isfinite(camera.unproject(pixels)).all(axis=1)
+    phi = np.linspace(-np.pi, np.pi, 200)
+    s = 0.9999 * np.interp(phi, lens.domain.angles, lens.domain.ends)
+    reach = np.hypot(*(camera.project(lens.chart.lift(s * np.cos(phi), s * np.sin(phi))) - [1000.0, 750.0]).T)
+    radius = np.hypot(*(pixels - [1000.0, 750.0]).T)
+    assert seen[radius < 0.999 * reach.min()].all()
+    assert not seen[radius > 1.01 * reach.max()].any()
+    assert 0.1 < seen.mean() < 0.9
+
+
 def test_a_lens_frame_equal_to_the_intrinsics_changes_nothing():
     points = np.array([[0.1, -0.2, 1.0], [0.4, 0.3, 1.5], [0.0, 0.0, 1.0]])
     plain, framed = Camera(SIZE, INTRINSICS, MILD), Camera(SIZE, INTRINSICS, MILD, INTRINSICS)

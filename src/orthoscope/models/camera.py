@@ -7,18 +7,18 @@ takes the place of K at the end: the lens then acts about its own distortion cen
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
+from orthoscope.models.blocks import in_blocks
 from orthoscope.models.lens import Lens
+from orthoscope.models.smooth_map import smooth_map
 
 __all__ = ["WIDEST", "Camera", "Intrinsics", "image_border"]
 
 WIDEST = np.deg2rad(75.0)  # rays farther from the axis than this a pin-hole stretches without end
-BLOCK = 32768  # pixels of an undistortion map that are made at once, so that the intermediate arrays stay in cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,13 @@ class Intrinsics:
         """(fx, fy, cx, cy, skew)."""
         return self.fx, self.fy, self.cx, self.cy, self.skew
 
+    def after(self, undone: Intrinsics, done: Intrinsics) -> Intrinsics:
+        """The pin-hole that does what `done` does, undoes `undone` and then does this: K times undone^-1 times done."""
+        if undone is done:
+            return self
+        (fx, skew, cx), (_, fy, cy), _ = self.matrix @ np.linalg.solve(undone.matrix, done.matrix)
+        return Intrinsics(fx, fy, cx, cy, skew)
+
     @property
     def matrix(self) -> Float[ndarray, "3 3"]:
         """K (3,3)."""
@@ -51,13 +58,22 @@ class Intrinsics:
 
     def to_pixels(self, plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2"]:
         """Pixels of places in the lens's plane."""
-        x, y = plane[:, 0], plane[:, 1]
-        return np.stack([self.fx * x + self.skew * y + self.cx, self.fy * y + self.cy], axis=-1)
+        return np.stack(self.pixel(plane[:, 0], plane[:, 1]), axis=-1)
 
     def to_plane(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2"]:
         """Places in the lens's plane of pixels."""
-        y = (pixels[:, 1] - self.cy) / self.fy
-        return np.stack([(pixels[:, 0] - self.cx - self.skew * y) / self.fx, y], axis=-1)
+        return np.stack(self.place(pixels[:, 0], pixels[:, 1]), axis=-1)
+
+    def pixel(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:
+        """The pixel (u, v) of a place in the lens's plane."""
+        u = self.fx * x + self.cx
+        return (u + self.skew * y if self.skew else u), self.fy * y + self.cy
+
+    def place(self, u: ndarray, v: ndarray) -> tuple[ndarray, ndarray]:
+        """The place (x, y) in the lens's plane of a pixel."""
+        y = (v - self.cy) / self.fy
+        x = u - self.cx
+        return (x - self.skew * y if self.skew else x) / self.fx, y
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +101,12 @@ class Camera:
 
         beyond: let the formula go on where the lens's domain has ended, as least squares does; such pixels are no images.
         """
-        if self.lens_frame is None:
-            return self.intrinsics.to_pixels(self.lens.distort(points, beyond=beyond))
-        lens_from_camera = np.linalg.solve(self.lens_frame.matrix, self.intrinsics.matrix)
-        return self.lens_frame.to_pixels(self.lens.distort(points @ lens_from_camera.T, beyond=beyond))
+        return (self.lens_frame or self.intrinsics).to_pixels(self.lens.distort(self._lens_rays(points), beyond=beyond))
 
     def unproject(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Unit rays (n,3), camera frame, that fall on pixels (n,2); NaN where none does."""
         frame = self.lens_frame or self.intrinsics
-        rays = self.lens.undistort(frame.to_plane(pixels))
+        rays = in_blocks(lambda u, v: self.lens.chart.lift(*self.lens.unwarp(*frame.place(u, v))), pixels, width=3)
         if self.lens_frame is None:
             return rays
         rays = rays @ np.linalg.solve(self.intrinsics.matrix, self.lens_frame.matrix).T
@@ -111,14 +124,17 @@ class Camera:
 
     def undistort_pixels(self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None) -> Float[ndarray, "n 2"]:
         """Where a pin-hole camera (`straight`, default this camera's own K) would see what these pixels show; NaN where it cannot."""
-        rays = self.unproject(pixels)
-        front = np.where(rays[:, 2:] > 0, rays[:, 2:], np.nan)
-        return (straight or self.intrinsics).to_pixels(rays[:, :2] / front)
+        frame = self.lens_frame or self.intrinsics
+        seen = (straight or self.intrinsics).after(self.intrinsics, frame)
+
+        def straighten(u, v):
+            return np.stack(seen.pixel(*self.lens.chart.flat(*self.lens.unwarp(*frame.place(u, v)))), axis=-1)
+
+        return in_blocks(straighten, pixels, width=2)
 
     def distort_pixels(self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None) -> Float[ndarray, "n 2"]:
         """The inverse of `undistort_pixels`: where this camera sees what a pin-hole camera sees at these pixels."""
-        plane = (straight or self.intrinsics).to_plane(pixels)
-        return self.project(np.concatenate([plane, np.ones((len(plane), 1))], axis=-1))
+        return self.project(_in_front((straight or self.intrinsics).to_plane(pixels)))
 
     def undistort_map(
         self, straight: Intrinsics | None = None, size: tuple[int, int] | None = None
@@ -128,15 +144,12 @@ class Camera:
         straight, size: intrinsics and (width, height) of the straight image, by default this camera's.  NaN where a ray lies beyond the
         lens's domain or its image outside the photograph by more than a pixel, so that nothing folds back.
         """
-        straight, (width, height) = straight or self.intrinsics, size or self.image_size
-        maps = np.empty((2, height, width), dtype=np.float32)
-        for rows in _row_blocks(width, height):
-            y, x = np.mgrid[rows.start : rows.stop, 0:width].astype(float).reshape(2, -1)
-            u, v = self.distort_pixels(np.stack([x, y], axis=-1), straight).T
-            u[(u < -1.0) | (u > self.image_size[0]) | (v < -1.0) | (v > self.image_size[1])] = np.nan
-            v[np.isnan(u)] = np.nan
-            maps[:, rows] = np.stack([u, v]).reshape(2, rows.stop - rows.start, width)
-        return maps[0], maps[1]
+        size, pin_hole = size or self.image_size, straight or self.intrinsics
+
+        def sees_all_up_to(pixels):
+            return self.lens.sees_all_up_to(self._lens_rays(_in_front(pin_hole.to_plane(pixels))))
+
+        return smooth_map(lambda pixels: self.distort_pixels(pixels, pin_hole), size, vouched=sees_all_up_to, limits=self.image_size)
 
     def straight_intrinsics(self, keep: str = "all", widest: float = WIDEST) -> Intrinsics:
         """A pin-hole for the straight image, same size: `all` keeps every photographed pixel, `valid` only places that were photographed.
@@ -157,6 +170,12 @@ class Camera:
             low, high = _inner_rectangle(plane, width / height)
         focal = np.array([width - 1.0, height - 1.0]) / (high - low)
         return Intrinsics(focal[0], focal[1], -focal[0] * low[0], -focal[1] * low[1])
+
+    def _lens_rays(self, points: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
+        """Points of the camera frame as the lens meets them: turned about its own distortion centre where it has one."""
+        if self.lens_frame is None:
+            return points
+        return points @ np.linalg.solve(self.lens_frame.matrix, self.intrinsics.matrix).T
 
     def _border_rays(self, border: ndarray, centre: ndarray, widest: float) -> ndarray:
         """Rays of the image's border; where a border pixel has none within `widest`, of the last pixel towards the centre that has."""
@@ -181,6 +200,11 @@ def image_border(image_size: tuple[int, int], samples: int = 64) -> Float[ndarra
     return np.concatenate([a + t[:, None] * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
 
 
+def _in_front(plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
+    """Points at depth 1."""
+    return np.concatenate([plane, np.ones((len(plane), 1))], axis=-1)
+
+
 def _inner_rectangle(plane: ndarray, aspect: float) -> tuple[ndarray, ndarray]:
     """A large upright rectangle of the given aspect inside the closed curve `plane`, grown from the curve's middle."""
     middle = 0.5 * (plane.min(0) + plane.max(0))
@@ -189,9 +213,3 @@ def _inner_rectangle(plane: ndarray, aspect: float) -> tuple[ndarray, ndarray]:
     half = np.maximum(np.abs(side[:, 0]) / aspect, np.abs(side[:, 1])).min()
     reach = np.array([half * aspect, half])
     return middle - reach, middle + reach
-
-
-def _row_blocks(width: int, height: int) -> Iterator[slice]:
-    rows = max(1, BLOCK // width)
-    for start in range(0, height, rows):
-        yield slice(start, min(start + rows, height))

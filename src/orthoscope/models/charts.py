@@ -20,6 +20,8 @@ __all__ = ["EQUIDISTANT", "GNOMONIC", "Chart", "Covector", "PullBack"]
 Covector = tuple[ndarray, ndarray, ndarray]
 PullBack = Callable[[ndarray, ndarray], Covector]
 
+TINY = 1e-150  # an angle below which theta and its sine are one, whose square is a number still
+
 
 class Chart(ABC):
     """A flattening of the directions around the axis."""
@@ -37,6 +39,10 @@ class Chart(ABC):
     @abstractmethod
     def lift(self, x: ndarray, y: ndarray) -> Float[ndarray, "*batch 3"]:
         """Unit rays of places."""
+
+    @abstractmethod
+    def flat(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:
+        """Where a pin-hole sees places, (X/Z, Y/Z) of their rays; NaN for those that are not in front of it."""
 
     @abstractmethod
     def radius(self, theta: Any) -> Any:
@@ -66,6 +72,9 @@ class _Gnomonic(Chart):
     def lift(self, x, y):
         inverse = 1.0 / np.sqrt(1.0 + x * x + y * y)
         return np.stack([x * inverse, y * inverse, inverse], axis=-1)
+
+    def flat(self, x, y):
+        return x, y
 
     def radius(self, theta: Any) -> Any:
         return np.tan(theta)
@@ -98,11 +107,19 @@ class _Equidistant(Chart):
         return X * stretch, Y * stretch, pull_back
 
     def lift(self, x, y):
-        theta = np.hypot(x, y)
-        sinc = np.sinc(theta / np.pi)
+        theta = np.sqrt(x * x + y * y)
+        sinc = np.sin(theta) / np.maximum(theta, TINY)
+        sinc[theta < TINY] = 1.0
         rays = np.stack([x * sinc, y * sinc, np.cos(theta)], axis=-1)
         rays[theta >= np.pi] = np.nan
         return rays
+
+    def flat(self, x, y):
+        theta = np.sqrt(x * x + y * y)
+        stretch = np.tan(theta) / np.maximum(theta, TINY)
+        stretch[theta < TINY] = 1.0
+        stretch[theta >= 0.5 * np.pi] = np.nan
+        return x * stretch, y * stretch
 
     def radius(self, theta: Any) -> Any:
         return theta

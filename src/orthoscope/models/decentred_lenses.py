@@ -16,6 +16,7 @@ import numpy as np
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.charts import GNOMONIC
 from orthoscope.models.lens import Formula, Warp
+from orthoscope.models.lookup import Lookup
 from orthoscope.models.warp import invert
 
 __all__ = ["Brown", "Rational"]
@@ -45,17 +46,21 @@ class _Decentred(Formula):
         return tuple(getattr(self, name) for name in ("tau_x", "tau_y"))
 
     @abstractmethod
-    def gain_by(self, name: str, u: ndarray, g: ndarray) -> ndarray | None:
-        """Derivative of the gain by a radial coefficient; None where the name is another kind of coefficient."""
+    def bare_gain(self, u: ndarray) -> ndarray:
+        """The gain g without its slope."""
+
+    @abstractmethod
+    def gain_slopes(self, u: ndarray, g: ndarray) -> dict[str, ndarray]:
+        """Derivatives of the gain by the radial coefficients, all at once since each is made of the one before."""
 
     def warp(self, x, y):
         u = x * x + y * y
-        g, _ = self.gain(u)
-        x_d, y_d = x * g, y * g
+        g = self.bare_gain(u)
         if self.p1 or self.p2:
-            cross = 2.0 * (self.p1 * y + self.p2 * x)
-            x_d += x * cross + self.p2 * u
-            y_d += y * cross + self.p1 * u
+            g = g + ((2.0 * self.p1) * y + (2.0 * self.p2) * x)
+            x_d, y_d = x * g + self.p2 * u, y * g + self.p1 * u
+        else:
+            x_d, y_d = x * g, y * g
         s1, s2, s3, s4 = self.prism
         if s1 or s2 or s3 or s4:
             x_d += (s1 + s2 * u) * u
@@ -64,13 +69,15 @@ class _Decentred(Formula):
 
     def linearise(self, x, y, wanted=()):
         u = x * x + y * y
-        g, h = self.gain(u)
-        cross = 2.0 * (self.p1 * y + self.p2 * x)
-        x_d = x * (g + cross) + self.p2 * u
-        y_d = y * (g + cross) + self.p1 * u
-        j_xy = h * x * y + 2.0 * (self.p1 * x + self.p2 * y)
-        j_xx = g + cross + x * (h * x + 4.0 * self.p2)
-        j_yy = g + cross + y * (h * y + 4.0 * self.p1)
+        radial, h = self.gain(u)
+        p1, p2 = 2.0 * self.p1, 2.0 * self.p2
+        g = radial + (p1 * y + p2 * x)
+        x_d = x * g + self.p2 * u
+        y_d = y * g + self.p1 * u
+        h_x = h * x
+        j_xy = h_x * y + (p1 * x + p2 * y)
+        j_xx = g + x * (h_x + 2.0 * p2)
+        j_yy = g + y * (h * y + 2.0 * p1)
         j_yx = j_xy
         s1, s2, s3, s4 = self.prism
         if s1 or s2 or s3 or s4:
@@ -78,7 +85,8 @@ class _Decentred(Formula):
             along_x, along_y = 2.0 * (s1 + 2.0 * s2 * u), 2.0 * (s3 + 2.0 * s4 * u)
             j_xx, j_xy = j_xx + along_x * x, j_xy + along_x * y
             j_yx, j_yy = j_yx + along_y * x, j_yy + along_y * y
-        by = [self._by(name, x, y, u, g) for name in wanted]
+        slopes = self.gain_slopes(u, radial) if wanted else {}
+        by = [_by(name, x, y, u, slopes) for name in wanted]
         flat = Warp(x_d, y_d, j_xx, j_xy, j_yx, j_yy, by)
         return self._tilted(flat, wanted) if any(self.tilt) or "tau_x" in wanted or "tau_y" in wanted else flat
 
@@ -88,37 +96,21 @@ class _Decentred(Formula):
             m = np.linalg.inv(self._tilt_matrix)
             in_front = m[2, 0] * x_d + m[2, 1] * y_d + m[2, 2] > 0  # past the horizon of the tilted plane nothing is seen
             x_d, y_d = _through(m, np.where(in_front, x_d, np.nan), y_d)
-        r_d = np.sqrt(x_d * x_d + y_d * y_d)
-        s_table, r_table = level._table
-        ratio = np.interp(r_d, r_table, s_table) / np.maximum(r_d, 1e-300)  # past the end: starts at it, Newton says
-        ratio[level.beyond_image(x_d, y_d)] = np.nan
-        return invert(level.linearise, self.sees, (x_d * ratio, y_d * ratio), (x_d, y_d))
-
-    def _by(self, name: str, x: ndarray, y: ndarray, u: ndarray, g: ndarray) -> tuple[ndarray, ndarray]:
-        zero = np.zeros_like(x)
-        match name:
-            case "p1":
-                return 2.0 * x * y, u + 2.0 * y * y
-            case "p2":
-                return u + 2.0 * x * x, 2.0 * x * y
-            case "s1":
-                return u, zero
-            case "s2":
-                return u * u, zero
-            case "s3":
-                return zero, u
-            case "s4":
-                return zero, u * u
-            case "tau_x" | "tau_y":
-                return zero, zero  # filled in by _tilted, where the untilted place is known
-        slope = self.gain_by(name, u, g)
-        assert slope is not None, name
-        return x * slope, y * slope
+        x, y = x_d.astype(np.float32), y_d.astype(np.float32)  # a start needs no more digits
+        with np.errstate(all="ignore"):
+            q = level._rough_inverse(x * x + y * y)
+        q[level.beyond_image(x_d, y_d)] = np.nan
+        return invert(level.linearise, self.sees, (x * q, y * q), (x_d, y_d), formula=level.warp)
 
     @cached_property
     def _level(self) -> _Decentred:
         """The same lens with its sensor square to the axis."""
         return self.with_coefficients(tau_x=0.0, tau_y=0.0) if any(self.tilt) else self
+
+    @cached_property
+    def _rough_inverse(self) -> Lookup:
+        """The inverse of the radial curve, in single precision."""
+        return self.inverse_curve.single()
 
     @cached_property
     def _tilt_matrix(self) -> ndarray:
@@ -159,21 +151,15 @@ class Brown(_Decentred):
     tau_x: float = 0.0
     tau_y: float = 0.0
 
-    def gain(self, u):
-        return (
-            1.0 + u * (self.k1 + u * (self.k2 + u * self.k3)),
-            2.0 * (self.k1 + u * (2.0 * self.k2 + (3.0 * self.k3) * u)),
-        )
+    def bare_gain(self, u):
+        return 1.0 + u * (self.k1 + u * (self.k2 + u * self.k3))
 
-    def gain_by(self, name, u, g):
-        match name:
-            case "k1":
-                return u
-            case "k2":
-                return u * u
-            case "k3":
-                return u * u * u
-        return None
+    def gain(self, u):
+        return self.bare_gain(u), 2.0 * self.k1 + u * (4.0 * self.k2 + (6.0 * self.k3) * u)
+
+    def gain_slopes(self, u, g):
+        u2 = u * u
+        return {"k1": u, "k2": u2, "k3": u2 * u}
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,22 +178,45 @@ class Rational(_Decentred):
     tau_x: float = 0.0
     tau_y: float = 0.0
 
+    def bare_gain(self, u):
+        return (1.0 + u * (self.k1 + u * (self.k2 + u * self.k3))) / self._denominator(u)
+
     def gain(self, u):
         below = 1.0 / self._denominator(u)
         g = (1.0 + u * (self.k1 + u * (self.k2 + u * self.k3))) * below
-        slope_above = self.k1 + u * (2.0 * self.k2 + (3.0 * self.k3) * u)
-        slope_below = self.k4 + u * (2.0 * self.k5 + (3.0 * self.k6) * u)
-        return g, 2.0 * (slope_above - g * slope_below) * below
+        slope_above = 2.0 * self.k1 + u * (4.0 * self.k2 + (6.0 * self.k3) * u)  # twice, as h is
+        slope_below = 2.0 * self.k4 + u * (4.0 * self.k5 + (6.0 * self.k6) * u)
+        return g, (slope_above - g * slope_below) * below
 
-    def gain_by(self, name, u, g):
-        power = {"k1": 1, "k2": 2, "k3": 3, "k4": 1, "k5": 2, "k6": 3}.get(name)
-        if power is None:
-            return None
-        slope = u**power / self._denominator(u)
-        return -g * slope if name in ("k4", "k5", "k6") else slope
+    def gain_slopes(self, u, g):
+        k1 = u / self._denominator(u)
+        k2, k4 = u * k1, -g * k1
+        k3, k5 = u * k2, u * k4
+        return {"k1": k1, "k2": k2, "k3": k3, "k4": k4, "k5": k5, "k6": u * k5}
 
     def _denominator(self, u: ndarray) -> ndarray:
         return 1.0 + u * (self.k4 + u * (self.k5 + u * self.k6))
+
+
+def _by(name: str, x: ndarray, y: ndarray, u: ndarray, slopes: dict[str, ndarray]) -> tuple[ndarray, ndarray]:
+    """Derivative of the place on a level sensor by one coefficient.  slopes: of the gain."""
+    if name in slopes:
+        return x * slopes[name], y * slopes[name]
+    if name == "p1":
+        return (2.0 * x) * y, u + (2.0 * y) * y
+    if name == "p2":
+        return u + (2.0 * x) * x, (2.0 * x) * y
+    zero = np.zeros_like(u)
+    match name:
+        case "s1":
+            return u, zero
+        case "s2":
+            return u * u, zero
+        case "s3":
+            return zero, u
+        case "s4":
+            return zero, u * u
+    return zero, zero  # tau_x and tau_y: filled in by _tilted, where the untilted place is known
 
 
 def _through(m: ndarray, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:

@@ -19,17 +19,21 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
+from orthoscope.geometry.arrays import Bool, Float, InputError, frozen, ndarray
+from orthoscope.models.blocks import in_blocks
 from orthoscope.models.charts import Chart
 from orthoscope.models.domain import Domain, find_domain
+from orthoscope.models.lookup import Lookup, tabulated
 from orthoscope.models.warp import Warp, determinant
 
 __all__ = ["Formula", "Lens", "RadialLens", "Warp"]
 
 SAMPLES = 1024  # radii at which a curve is tabulated: as start of the inverse, and to find the first fold
 SECTORS = 32  # of directions in the image, for each of which it is known how far the image reaches
-BLOCK = 16384  # places that are undistorted at once, so that the intermediate arrays stay in cache
 STEEPEST = 1e-6  # a gnomonic chart is looked at up to this close to 90 degrees (radians)
+MIDDLE = np.pi / 4  # of the inverse's table half of the cells lie within this angle
+NEAR = 3e-9  # a Newton step shorter than this share leaves less than a rounding, since the error squares;
+SHY = 0.99  # but not beside a fold or a border where the slope has none: there u_d goes from this share of its end to all of it
 TINY = 1e-150  # a radius next to zero whose square is a number still
 
 AnyLens = TypeVar("AnyLens", bound="Lens")
@@ -105,27 +109,32 @@ class Lens(ABC):
 
     def undistort(self, plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Unit rays (n,3) that fall on these places (n,2) of the lens's plane; NaN where none does."""
-        rays = np.empty((len(plane), 3))
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            for start in range(0, len(plane), BLOCK):
-                block = slice(start, start + BLOCK)
-                rays[block] = self.chart.lift(*self.unwarp(plane[block, 0].copy(), plane[block, 1].copy()))
-        return rays
+        return in_blocks(lambda x_d, y_d: self.chart.lift(*self.unwarp(x_d, y_d)), plane, width=3)
 
     def sees(self, x: ndarray, y: ndarray) -> ndarray:
         """Which places of the chart lie in the domain."""
         domain = self.domain
-        s = np.sqrt(x * x + y * y)
-        seen = s < domain.inner
+        u = x * x + y * y
+        seen = u < domain.inner * domain.inner
         if domain.hole:
-            seen &= s >= domain.hole
-        if self.radially_symmetric:
+            seen &= u >= domain.hole * domain.hole
+        if self.radially_symmetric or seen.all():
             return seen
+        s = np.sqrt(u)
         border = np.flatnonzero(~seen & (s <= 1.01 * domain.outer))
         if len(border):
             at = self.linearise(x[border], y[border])
             seen[border] = (s[border] < domain.ends_towards(x[border], y[border])) & (determinant(at) > 0) & np.isfinite(at.x)
         return seen
+
+    def sees_all_up_to(self, rays: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
+        """Whether not only a ray (n,3) lies in the domain but every one that is no farther from the axis, so far as is known at once.
+
+        In a pin-hole's plane these are a disc: a lens that sees all up to the corners of a rectangle sees all of the rectangle.
+        """
+        with np.errstate(invalid="ignore"):
+            x, y = self.chart.flatten(rays[:, 0], rays[:, 1], rays[:, 2])
+        return (x * x + y * y < self.domain.inner**2) & (self.domain.hole == 0)
 
     def invert_curve(self, r_d: ndarray) -> ndarray:
         """s of the radial curve at r_d >= 0: table, Newton, and bisection where Newton was not exact; NaN beyond the domain."""
@@ -162,10 +171,10 @@ class Lens(ABC):
     def beyond_image(self, x_d: ndarray, y_d: ndarray) -> ndarray:
         """Which places are certainly not in the image of the domain: farther out than any sample of it in about their direction."""
         farthest = self._farthest
-        r_d = np.sqrt(x_d * x_d + y_d * y_d)
-        beyond = ~(r_d <= farthest.min())
+        u_d = x_d * x_d + y_d * y_d
+        beyond = ~(u_d <= farthest.min() ** 2)
         check = np.flatnonzero(beyond)
-        beyond[check] = ~(r_d[check] <= farthest[_sector(x_d[check], y_d[check])])
+        beyond[check] = ~(np.sqrt(u_d[check]) <= farthest[_sector(x_d[check], y_d[check])])
         return beyond
 
     @cached_property
@@ -233,6 +242,19 @@ class Lens(ABC):
         usable = np.isfinite(r) & (r >= 0)
         return s[usable], r[usable]
 
+    @cached_property
+    def inverse_curve(self) -> Lookup:
+        """The inverse of the radial curve, tabulated."""
+        s_table, r_table = self._table
+        middle = float(np.interp(min(float(self.chart.radius(MIDDLE)), 0.5 * s_table[-1]), s_table, r_table))
+
+        def ratio(u_d):
+            with np.errstate(all="ignore"):
+                r_d = np.maximum(np.sqrt(u_d), TINY)
+                return self.invert_curve(r_d) / r_d
+
+        return tabulated(ratio, end=float(r_table[-1] ** 2), last=float(s_table[-1]), middle=middle * middle)
+
     @property
     def _curve_end(self) -> float:
         """Where the radial curve of a lens with other terms too ends by itself."""
@@ -291,11 +313,23 @@ class RadialLens(Formula):
         return Warp(x * g, y * g, g + h * x * x, h_xy, h_xy, g + h * y * y, by)
 
     def unwarp(self, x_d, y_d):
-        r_d = np.sqrt(x_d * x_d + y_d * y_d)
+        if len(self._table[1]) == 0:  # a curve that is negative all along
+            return np.full_like(x_d, np.nan), np.full_like(y_d, np.nan)
+        u_d = x_d * x_d + y_d * y_d
+        q = self.inverse_curve(u_d)
+        u = q * q * u_d
+        g, h = self.gain(u)
+        step = (q * g - 1.0) / (g + h * u)
+        q -= step
+        poor = np.flatnonzero(~((np.abs(step) <= NEAR * q) & (u_d <= SHY * self.inverse_curve.end)))
+        q[poor] = self._exact_ratio(np.sqrt(u_d[poor]))
+        return x_d * q, y_d * q
+
+    def _exact_ratio(self, r_d: ndarray) -> ndarray:
+        """s / r_d where the table is no good start: beside a fold, at the centre of a curve that has a corner there, beyond the domain."""
         s = self.invert_curve(r_d)
         centre = r_d == 0
-        ratio = np.where(centre, np.where(s == 0, 1.0, np.nan), s / np.where(centre, 1.0, r_d))
-        return x_d * ratio, y_d * ratio
+        return np.where(centre, np.where(s == 0, 1.0, np.nan), s / np.where(centre, 1.0, r_d))
 
 
 def _sector(x: ndarray, y: ndarray) -> ndarray:

@@ -12,6 +12,7 @@ kannala_brandt    J. Kannala and S. Brandt, A generic camera model and calibrati
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import prod
 from typing import ClassVar
 
 import numpy as np
@@ -50,8 +51,8 @@ class Pfet(RadialLens):
         return g + self.a0 / s, slope / s - self.a0 / (u * s)
 
     def gain_by(self, name, u, g):
-        power = int(name[1]) - 1
-        return np.sqrt(u) ** power if power >= 0 else 1.0 / np.sqrt(u)
+        s, power = np.sqrt(u), int(name[1]) - 1
+        return prod([s] * power, start=np.ones_like(s)) if power >= 0 else 1.0 / s
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +147,7 @@ class KannalaBrandt(RadialLens):
         return 1.0 + u * (k1 + u * (k2 + u * (k3 + u * k4))), 2.0 * (k1 + u * (2 * k2 + u * (3 * k3 + 4 * k4 * u)))
 
     def gain_by(self, name, u, g):
-        return u ** int(name[1])
+        return prod([u] * int(name[1]), start=np.ones_like(u))  # many times faster than a power
 
 
 def _over(above: ndarray, below: ndarray) -> ndarray:
