@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from boards import BOARD, NARROW, bent, perfect, photographs_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 from orthoscope.evaluation.coverage import corners_by_cell
@@ -15,15 +17,16 @@ from orthoscope.evaluation.evaluate import Evaluation, evaluate, evaluate_on
 from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.geometry.target import Detections, View, chessboard
+from orthoscope.geometry.target import Detections, View
 from orthoscope.methods.calibration import rms
 from orthoscope.methods.fccm import fccm
 from orthoscope.methods.held_out import held_out
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.target_shape import TargetShape
+from real_sets import classic
 
 CAMERA = Camera((640, 480), Intrinsics(520.0, 524.0, 325.0, 236.0), Brown(k1=-0.28, k2=0.09, p1=1e-3))
-BOARD = chessboard(9, 6, 0.025)
 NOISE = 0.2  # px per coordinate
 
 
@@ -169,6 +172,54 @@ def test_the_place_that_no_photograph_covers_is_named(empty):
 def test_a_verdict_over_a_part_of_the_frame_says_so():
     evaluation = evaluate(fccm(small_boards_but_for((0, 0)), lens="brown:k1"))
     assert re.search(rf", where corners were seen: {100 * evaluation.coverage:.0f} % of the frame\.$", evaluation.verdict)
+
+
+# --- targets and lenses that are not what they are said to be --------------------------------------------------------
+
+
+def test_a_bent_board_is_told_of_in_px_and_mm_with_what_to_do():
+    evaluation = evaluate(fccm(photographs_of(bent(2.0), 15, 0), lens="brown"))
+    warning = evaluation.warnings[0]
+    told = re.search(r"off their places by the same (0\.\d+) px, (0\.\d+) mm on the target .* image is off by (\d\.\d) px or more", warning)
+    assert told
+    target = evaluation.misfit.target
+    assert_allclose(float(told[1]), target.test.systematic_px, rtol=0.05)  # told to two digits
+    assert_allclose(float(told[2]), 1e3 * target.test.systematic_px / target.pixels_per_metre, rtol=0.05)
+    assert_allclose(float(told[3]), target.moves_camera_px, rtol=0.05)
+    assert warning.endswith("Estimate its shape: --method decoupled")
+    assert evaluation.verdict.startswith("Do not trust this camera yet, though it shows 0.")
+
+
+def test_a_shape_that_was_estimated_and_is_wrong_is_not_called_flat():
+    calibration = fccm(photographs_of(bent(2.0), 15, 0), lens="brown")
+    shaped = replace(calibration, target_shape=TargetShape("smooth", 0.1 * (bent(2.0) - BOARD.points)))
+    warning = evaluate(shaped).warnings[0]
+    assert warning.startswith("the target is not of the shape that was estimated: ")
+    assert "--method decoupled" not in warning
+
+
+def test_a_lens_formula_that_cannot_follow_is_told_of_with_others_to_try():
+    evaluation = evaluate(fccm(perfect(NARROW, 20, 1)[1], lens="division"))
+    (warning,) = evaluation.warnings
+    assert warning.startswith(
+        "the formula division cannot follow this lens: at the same places of the image corners are off by the same 0."
+    )
+    assert warning.endswith("Try another: --lens brown, rational or kannala_brandt")
+    assert "; the formula division limits it: 0." in evaluation.verdict
+
+
+@pytest.mark.datasets
+def test_calibrel_looks_perfect_by_every_usual_check_and_is_not_to_be_trusted(datasets: Path):
+    evaluation = evaluate(fccm(classic(datasets, "calibrel"), lens="brown"))
+    assert evaluation.held_out_rms_px < 1.02 * evaluation.rms_px  # photographs that were not used are no worse
+    assert evaluation.suspects == ()
+    assert evaluation.coverage == 1.0
+    assert evaluation.calibration.uncertainty.deviations["cx"] < 3.0  # px, though it is about 70 px from where the target's shape puts it
+    (warning,) = evaluation.warnings
+    assert warning.startswith("the target is not flat, or not as it is described: in view after view")
+    assert evaluation.misfit.target.moves_camera_px > 3.0 * evaluation.held_out_rms_px
+    assert evaluation.verdict.startswith("Do not trust this camera yet")
+    assert evaluation.verdict.endswith("Estimate its shape: --method decoupled.")
 
 
 # --- other photographs -----------------------------------------------------------------------------------------------

@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 
 from orthoscope.evaluation.evaluate import Evaluation, ViewError
+from orthoscope.evaluation.misfit import misfit
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections, SetAside, Target, View, chessboard
-from orthoscope.methods.calibration import Calibration, Uncertainty, rms
+from orthoscope.methods.calibration import Calibration, Candidate, Uncertainty, rms
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.target_shape import TargetShape
 
 NOISE = 0.15  # px per coordinate
+PRINT = np.stack([1e-3 * np.sin(np.arange(54)), 2e-4 * (np.arange(54) // 9), 2e-3 * np.cos(np.arange(54) // 9)], axis=-1)  # metres
 
 
 def photographed(
@@ -58,6 +61,7 @@ def evaluated(calibration: Calibration, *, held_out: bool = True) -> Evaluation:
         held_out_rms_px=factor * calibration.rms_px,
         held_out_error_px=0.012 if held_out else np.nan,
         nce=0.31,
+        misfit=misfit(calibration),
         coverage=0.87,
         views=views,
         held_out_residuals=tuple(factor * e for e in residuals),
@@ -124,9 +128,41 @@ def unheld(ordinary) -> Evaluation:
 
 
 @pytest.fixture(scope="session")
-def every_evaluation(ordinary, fisheye, suspicious, single, unheld) -> dict[str, Evaluation]:
+def misshapen(ordinary) -> Evaluation:
+    """A board whose print is stretched and wavy, taken as flat and true."""
+    calibration = ordinary.calibration
+    true = replace(calibration.detections.target, points=calibration.detections.target.points + PRINT * [1.0, 1.0, 0.0])
+    poses, camera = calibration.camera_from_target, calibration.camera
+    shifts = (
+        (camera.project(pose.apply(true.points)) - camera.project(pose.apply(calibration.detections.target.points)))[view.ids]
+        for pose, view in zip(poses, calibration.detections.views, strict=True)
+    )
+    views = (replace(view, pixels=view.pixels + shift) for view, shift in zip(calibration.detections.views, shifts, strict=True))
+    return evaluated(replace(calibration, detections=replace(calibration.detections, views=tuple(views))))
+
+
+@pytest.fixture(scope="session")
+def shaped(misshapen) -> Evaluation:
+    """The same with its shape estimated, and a formula that was chosen among others and stands for a free lens."""
+    camera = misshapen.calibration.camera
+    other = replace(camera, lens=camera.lens.with_coefficients(k1=-0.279))
+    tried = (Candidate("flat", "brown", 0.31, 0.02, 0.09), Candidate("free", "brown", 0.22, 0.01, 0.0))
+    shape = TargetShape("free", PRINT)
+    return evaluated(replace(misshapen.calibration, target_shape=shape, free_camera=other, candidates=tried))
+
+
+@pytest.fixture(scope="session")
+def every_evaluation(ordinary, fisheye, suspicious, single, unheld, misshapen, shaped) -> dict[str, Evaluation]:
     """All of the above by name."""
-    return {"ordinary": ordinary, "fisheye": fisheye, "suspicious": suspicious, "single": single, "unheld": unheld}
+    return {
+        "ordinary": ordinary,
+        "fisheye": fisheye,
+        "suspicious": suspicious,
+        "single": single,
+        "unheld": unheld,
+        "misshapen": misshapen,
+        "shaped": shaped,
+    }
 
 
 @pytest.fixture(scope="session")

@@ -4,27 +4,40 @@ from __future__ import annotations
 
 import base64
 import io
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 from numpy.testing import assert_allclose
 from PIL import Image  # comes with matplotlib
 
+from orthoscope.evaluation.cells import Cells, cells_for
+from orthoscope.evaluation.misfit import misfit
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.target import Detections
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import LENSES, Brown, KannalaBrandt
-from orthoscope.report.figures import photograph_uri, residual_vectors, residuals_by_place, residuals_by_view, to_svg
-from orthoscope.report.figures.cells import Cells, cells_for
+from orthoscope.report.figures import (
+    lens_difference,
+    lens_misfit,
+    photograph_uri,
+    residual_vectors,
+    residuals_by_place,
+    residuals_by_view,
+    target_misfit,
+    target_shape,
+    to_svg,
+)
 from orthoscope.report.figures.lens import _along_angles, distortion_curve
 from orthoscope.report.figures.style import RED
 from orthoscope.report.plates import PLATES
 
-KINDS = ("ordinary", "fisheye", "unheld")  # pages of all of them are drawn in test_page.py
-UNITS = ("(px)", "(px per point)", "(m)", "(°)", "(name)", "(number in the table below)")
+KINDS = ("ordinary", "fisheye", "unheld", "misshapen", "shaped")  # pages of all of them are drawn in test_page.py
+UNITS = ("(px)", "(mm)", "(px per point)", "(m)", "(°)", "(name)", "(number in the table below)")
 
 for_every_plate = pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
 
@@ -32,6 +45,8 @@ for_every_plate = pytest.mark.parametrize("plate", PLATES, ids=lambda plate: pla
 @for_every_plate
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_figure_of_every_evaluation_has_labelled_axes_with_units(plate, kind, every_evaluation):
+    if not plate.suits(every_evaluation[kind]):
+        return
     figure = plate.draw(every_evaluation[kind])
     assert isinstance(figure, Figure)
     for axes in figure.axes:
@@ -46,7 +61,14 @@ def test_every_figure_of_every_evaluation_has_labelled_axes_with_units(plate, ki
 def test_a_calibration_without_corners_still_has_its_figures(plate, ordinary):
     empty = Detections(ordinary.calibration.detections.target, (640, 480), ())
     calibration = replace(ordinary.calibration, detections=empty, camera_from_target=())
-    to_svg(plate.draw(replace(ordinary, calibration=calibration, views=(), held_out_residuals=(), suspects=())), plate.name)
+    nothing = replace(ordinary, calibration=calibration, views=(), held_out_residuals=(), suspects=(), misfit=misfit(calibration))
+    if plate.suits(nothing):
+        to_svg(plate.draw(nothing), plate.name)
+
+
+@for_every_plate
+def test_every_figure_suits_some_evaluation(plate, every_evaluation):
+    assert any(plate.suits(evaluation) for evaluation in every_evaluation.values())
 
 
 def test_a_residual_arrow_starts_at_the_detected_corner_and_ends_at_the_predicted_one(ordinary):
@@ -58,6 +80,39 @@ def test_a_residual_arrow_starts_at_the_detected_corner_and_ends_at_the_predicte
     assert_allclose(arrows.get_offsets(), detected[order])
     assert_allclose(np.stack([arrows.U, arrows.V], axis=-1), residuals[order])
     assert (arrows.angles, arrows.scale_units) == ("xy", "xy")
+
+
+def test_misfits_of_noise_say_that_there_is_only_noise(ordinary):
+    for figure in (target_misfit(ordinary), lens_misfit(ordinary)):
+        assert "the views agree on nothing: only noise" in [text.get_text() for text in figure.axes[0].texts]
+
+
+def test_misfits_of_one_view_say_that_it_is_too_few(single):
+    for figure in (target_misfit(single), lens_misfit(single)):
+        assert "too few views to tell" in [text.get_text() for text in figure.axes[0].texts]
+
+
+def test_a_displaced_corner_is_an_arrow_from_its_place_in_millimetres(shaped):
+    shape = target_shape(shaped.calibration)
+    arrows = next(drawn for drawn in shape.axes[0].collections if isinstance(drawn, Quiver))
+    points, moved = shaped.calibration.detections.target.points, shaped.calibration.target_shape.displacements
+    assert_allclose(arrows.get_offsets(), 1e3 * points[:, :2])
+    assert_allclose(np.stack([arrows.U, arrows.V], axis=-1), 1e3 * moved[:, :2])
+    assert shape.axes[1].get_ylabel() == "out of the plane, away from the camera (mm)"
+
+
+def test_the_misfit_of_a_bent_board_is_drawn_with_its_scale_in_pixels(misshapen):
+    texts = [text.get_text() for text in target_misfit(misshapen).axes[0].texts]
+    assert any(re.search(r"mm   \(in the plane, magnified \d+ times; 1 mm is \d\.\d px\)", text) for text in texts)
+
+
+def test_the_difference_between_a_lens_and_itself_is_nothing_and_another_is_mapped(ordinary, fisheye):
+    camera = ordinary.calibration.camera
+    other = replace(camera, lens=Brown(k1=-0.2))
+    assert lens_difference(camera, camera).axes[1].get_ylabel() == lens_difference(camera, other).axes[1].get_ylabel()
+    largest = [float(lens_difference(camera, one).axes[0].collections[0].get_array().max()) for one in (camera, other)]
+    assert largest[0] < 1e-6 < 1.0 < largest[1]
+    to_svg(lens_difference(fisheye.calibration.camera, replace(fisheye.calibration.camera, lens=KannalaBrandt())), "difference")
 
 
 def test_residuals_by_place_are_the_held_out_ones_where_there_are_any(ordinary, unheld):

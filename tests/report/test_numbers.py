@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orthoscope.report.numbers import ABSENT, degrees, percent, pixels, setting, value_with_deviation
+from orthoscope.report.numbers import ABSENT, degrees, percent, pixels, probability, setting, value_with_deviation
 
 
 @pytest.mark.parametrize(
@@ -32,6 +32,10 @@ def test_a_value_ends_where_its_deviation_has_its_second_digit(value, deviation,
 
 def test_angles_and_shares_that_do_not_exist_are_dashes():
     assert (degrees(np.pi), degrees(np.nan), percent(0.875), percent(np.nan)) == ("180.0°", ABSENT, "88 %", ABSENT)
+
+
+def test_a_probability_that_is_next_to_nothing_is_only_said_to_be_small():
+    assert [probability(p) for p in (0.2345, 0.001, 1e-200, 0.0, np.nan)] == ["0.23", "0.001", "< 0.001", "< 0.001", ABSENT]
 
 
 def test_settings_of_any_kind_are_text_without_addresses():

@@ -14,12 +14,16 @@ import numpy as np
 import pytest
 
 from orthoscope.geometry.arrays import InputError
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.spline import Displacement, Lattice
+from orthoscope.models.target_shape import TargetShape
 from orthoscope.report import page as page_module
 from orthoscope.report.numbers import ABSENT
 from orthoscope.report.page import report_page, write_report
-from orthoscope.report.tables import cards, parameters, view_rows, warnings
+from orthoscope.report.shape import shape_rows
+from orthoscope.report.tables import candidate_rows, cards, lens_name, misfit_rows, parameters, view_rows, warnings
 
-KINDS = ("ordinary", "suspicious", "fisheye", "single", "unheld")
+KINDS = ("ordinary", "suspicious", "fisheye", "single", "unheld", "misshapen", "shaped")
 LOADS = {"src", "href", "xlink:href", "srcset", "data", "poster", "action"}
 
 
@@ -152,6 +156,48 @@ def test_a_parameter_is_shown_to_the_second_digit_of_its_deviation_or_as_fixed(o
     assert "tau_x" not in shown  # zero and not estimated: named below the table instead
     assert {row.name: row.deviation for row in parameters(single.calibration)}["fy"] == "2.0"  # tied to fx, 4 is its variance
     assert {row.deviation for row in parameters(unheld.calibration)} == {ABSENT}
+
+
+def test_the_table_of_misfits_has_what_agrees_what_does_not_and_how_sure_that_is(misshapen, single):
+    target, lens = misfit_rows(misshapen)
+    test = misshapen.misfit.target.test
+    assert (target.what, lens.what) == ("target", "lens formula")
+    assert (target.systematic, target.noise) == (f"{test.systematic_px:.3f}", f"{test.noise_px:.3f}")
+    assert (target.p_value, target.p_over_views, lens.moves) == ("< 0.001", "< 0.001", ABSENT)
+    assert {row.f for row in misfit_rows(single)} == {ABSENT}
+
+
+def test_a_target_whose_shape_was_estimated_has_its_table_and_its_figure_and_a_flat_one_has_not(pages, shaped):
+    assert "Shape of the target" in pages["shaped"]
+    assert "Shape of the target" not in pages["misshapen"]
+    rows = dict(shape_rows(shaped.calibration))
+    assert rows["shape"] == "every corner its own place"
+    assert rows["out of the plane, lowest to highest"] == "3.98 mm"  # 2 (1 - cos 3)
+    assert shape_rows(replace(shaped.calibration, target_shape=TargetShape.flat(54))) == []
+
+
+def test_what_was_tried_is_told_with_what_it_loses(pages, shaped):
+    flat, free = candidate_rows(shaped.calibration)
+    assert (flat.target, flat.held_out, flat.standard_error, flat.loses) == ("flat", "0.310", "0.020", "0.090")
+    assert free.loses == "taken"
+    assert "What was tried" in pages["shaped"]
+    assert "Formula against free lens" in pages["shaped"]
+    assert "What was tried" not in pages["misshapen"]
+
+
+def test_a_free_lens_is_named_with_what_it_stands_on(ordinary):
+    camera = ordinary.calibration.camera
+    lattice = Lattice.over(np.array([-1.0, -1.0]), np.array([1.0, 1.0]), (4, 4))
+    free = FreeLens(camera.lens, Displacement(lattice, np.zeros((lattice.splines, 2))))
+    assert lens_name(replace(camera, lens=free)) == "free, on brown"
+
+
+def test_stretch_and_shear_are_what_the_print_was_made_with(shaped):
+    x, y, _ = shaped.calibration.detections.target.points.T
+    made = np.stack([0.001 * x + 0.002 * y, 0.004 * y, 0.0 * x], axis=-1)
+    rows = dict(shape_rows(replace(shaped.calibration, target_shape=TargetShape("smooth", made))))
+    assert rows["stretch of y against x"] == "+0.3 %"
+    assert rows["shear"] == f"+{np.degrees(0.002):.2g}°"
 
 
 def test_cards_say_that_nothing_was_held_out_instead_of_a_number(single):

@@ -1,7 +1,7 @@
 """How good a calibration is: its numbers, and the sentences that verdict.py makes of them.
 
 Floor 4.  The error that counts is that of photographs which were held out; rms, NCE, coverage and the views that do not belong stand
-beside it.
+beside it.  What held-out photographs cannot show, a target or a formula that is wrong in all of them, the misfit tests find.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from orthoscope.evaluation.coverage import share_covered
 from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
+from orthoscope.evaluation.misfit import Misfit, misfit
 from orthoscope.evaluation.verdict import Findings, ViewError, corners_beyond, suspects_among, verdict_on, warnings_about
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.target import Detections
@@ -24,6 +25,7 @@ from orthoscope.methods.held_out import HeldOut, held_out
 from orthoscope.methods.resection import resect
 from orthoscope.methods.screening import screened
 from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import TargetShape
 
 __all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on"]
 
@@ -34,9 +36,9 @@ class Evaluation:
 
     rms_px, median_px, largest_px: of |residual| over the corners it was made from.  held_out_rms_px: over all corners, each from a fold
     that did not use its photograph; held_out_error_px: its standard error over views; NaN where there were too few views.  nce: of
-    held-out views where there are any, else of the training views.  coverage: share of the frame's cells where corners were seen
-    (coverage.py). suspects: views and why they do not belong.  warnings: sentences.  verdict: one sentence.  held_out_residuals: one
-    array (n,2) for each view, NaN where not done.
+    held-out views where there are any, else of the training views.  misfit: of the target and of the lens (misfit.py).  coverage: share
+    of the frame's cells where corners were seen (coverage.py).  suspects: views and why they do not belong.  warnings:
+    sentences.  verdict: one sentence.  held_out_residuals: one array (n,2) for each view, NaN where not done.
     """
 
     calibration: Calibration
@@ -46,6 +48,7 @@ class Evaluation:
     held_out_rms_px: float
     held_out_error_px: float
     nce: float
+    misfit: Misfit
     coverage: float
     views: tuple[ViewError, ...]
     held_out_residuals: tuple[ndarray, ...]
@@ -64,18 +67,19 @@ class UnseenError:
     nce: float
 
 
-def evaluate_on(camera: Camera, detections: Detections) -> UnseenError:
+def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | None = None) -> UnseenError:
     """The error of a camera on other photographs: the camera stays fixed, the pose of each view is fitted.
 
+    shape: of the target, where it is known and these photographs show the same one.
     Raises InputError where the photographs are of another size than the camera's, CalibrationError where no view can be used.
     """
     if tuple(detections.image_size) != tuple(camera.image_size):
         (width, height), (w, h) = detections.image_size, camera.image_size
         raise InputError(f"these photographs are {width}x{height}; the camera was calibrated at {w}x{h}. Hand in photographs of that size.")
     used = screened(detections)
-    poses = resect(camera, used)
-    residuals = residuals_of(camera, poses, used)
-    estimated, observed = lateral_errors(camera, poses, used)
+    poses = resect(camera, used, shape=shape)
+    residuals = residuals_of(camera, poses, used, shape=shape)
+    estimated, observed = lateral_errors(camera, poses, used, shape=shape)
     nce = normalised_calibration_error(estimated, observed, camera.intrinsics) if len(observed) else float("nan")
     return UnseenError(used, rms(np.concatenate(residuals)), tuple(rms(e) for e in residuals), nce)
 
@@ -100,7 +104,9 @@ def evaluate(
         ViewError(view.image, len(view.ids), rms(e), rms(e_unseen))
         for view, e, e_unseen in zip(detections.views, residuals, unseen.residuals, strict=True)
     )
-    found = Findings(calibration, unseen, share_covered(calibration), suspects_among(views), corners_beyond(calibration))
+    found = Findings(
+        calibration, unseen, misfit(calibration), share_covered(calibration), suspects_among(views), corners_beyond(calibration)
+    )
     return Evaluation(
         calibration=calibration,
         rms_px=rms(np.concatenate(residuals)),
@@ -109,6 +115,7 @@ def evaluate(
         held_out_rms_px=unseen.rms_px,
         held_out_error_px=unseen.standard_error_px,
         nce=_nce(calibration, unseen),
+        misfit=found.misfit,
         coverage=found.coverage,
         views=views,
         held_out_residuals=unseen.residuals,
@@ -122,13 +129,13 @@ def _nce(calibration: Calibration, unseen: HeldOut) -> float:
     """NCE over the views that were held out; over the training views where none was."""
     detections = calibration.detections
     total, corners = 0.0, 0
-    for i, (camera, pose) in enumerate(zip(unseen.cameras, unseen.camera_from_target, strict=True)):
+    for i, (camera, shape, pose) in enumerate(zip(unseen.cameras, unseen.shapes, unseen.camera_from_target, strict=True)):
         if camera is not None and pose is not None:
-            estimated, observed = lateral_errors(camera, (pose,), detections.only([i]))
+            estimated, observed = lateral_errors(camera, (pose,), detections.only([i]), shape=shape)
             if len(observed):
                 total += len(observed) * normalised_calibration_error(estimated, observed, camera.intrinsics)
             corners += len(observed)
     if corners:
         return total / corners
-    estimated, observed = lateral_errors(calibration.camera, calibration.camera_from_target, detections)
+    estimated, observed = lateral_errors(calibration.camera, calibration.camera_from_target, detections, shape=calibration.target_shape)
     return normalised_calibration_error(estimated, observed, calibration.camera.intrinsics) if len(observed) else float("nan")

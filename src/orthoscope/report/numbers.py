@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["ABSENT", "degrees", "percent", "pixels", "setting", "value_with_deviation"]
+__all__ = ["ABSENT", "degrees", "percent", "pixels", "probability", "setting", "value_with_deviation"]
 
 ABSENT = "\N{EN DASH}"
 
@@ -26,6 +26,13 @@ def pixels(value: float) -> str:
 def percent(share: float) -> str:
     """A share of one, in whole percent."""
     return f"{100 * share:.0f} %" if math.isfinite(share) else ABSENT
+
+
+def probability(p: float) -> str:
+    """A probability, two digits; one that is next to nothing is only said to be below a thousandth."""
+    if not math.isfinite(p):
+        return ABSENT
+    return "< 0.001" if p < 0.001 else f"{p:.2g}"
 
 
 def degrees(angle: float) -> str:

@@ -14,6 +14,7 @@ from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.io.files import write_text
 from orthoscope.report import tables
+from orthoscope.report.shape import shape_rows
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -38,6 +39,9 @@ def report_page(evaluation: Evaluation, *, photograph: Photograph | None = None)
         cards=tables.cards(evaluation),
         parameters=tables.parameters(calibration),
         lens=tables.lens_rows(calibration),
+        misfits=tables.misfit_rows(evaluation),
+        shape=shape_rows(calibration),
+        candidates=tables.candidate_rows(calibration),
         warnings=tables.warnings(evaluation),
         views=tables.view_rows(evaluation),
         settings=tables.settings_rows(calibration),
@@ -73,7 +77,11 @@ def _plates(evaluation: Evaluation) -> list[dict[str, object]]:
     from orthoscope.report.figures import to_svg
     from orthoscope.report.plates import PLATES
 
-    return [{"title": p.title, "caption": p.caption, "wide": p.wide, "svg": Markup(to_svg(p.draw(evaluation), p.name))} for p in PLATES]
+    return [
+        {"title": p.title, "caption": p.caption, "wide": p.wide, "svg": Markup(to_svg(p.draw(evaluation), p.name))}
+        for p in PLATES
+        if p.suits(evaluation)
+    ]
 
 
 def _shown(photograph: Photograph | None) -> dict[str, str] | None:

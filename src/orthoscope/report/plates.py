@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from orthoscope.evaluation.evaluate import Evaluation
+from orthoscope.methods.calibration import Calibration
 from orthoscope.report import figures
 
 __all__ = ["PLATES", "Plate"]
@@ -18,13 +19,17 @@ __all__ = ["PLATES", "Plate"]
 
 @dataclass(frozen=True)
 class Plate:
-    """One figure of the page: its name (also the prefix of its ids), title, caption, and how it is drawn; `wide` spans both columns."""
+    """One figure of the page: its name (also the prefix of its ids), title, caption, how it is drawn, and for which evaluations.
+
+    wide: spans both columns.
+    """
 
     name: str
     title: str
     caption: str
     draw: Callable[[Evaluation], Figure]
     wide: bool = False
+    suits: Callable[[Evaluation], bool] = lambda _: True
 
 
 PLATES = (
@@ -46,6 +51,25 @@ PLATES = (
         "Residuals by image place",
         "White arrows that agree with their neighbours are what the lens formula cannot follow. Grey places have fewer than four corners.",
         figures.residuals_by_place,
+    ),
+    Plate(
+        "target-misfit",
+        "Target misfit",
+        "Where corners seem to be against where they are said to be, as far as views agree. A pattern is a bent or badly printed target.",
+        figures.target_misfit,
+    ),
+    Plate(
+        "lens-misfit",
+        "Lens misfit",
+        "What stays the same at a place of the image, whichever corner is there: the part of the lens that its formula cannot follow.",
+        figures.lens_misfit,
+    ),
+    Plate(
+        "target-shape",
+        "Shape of the target",
+        "Where the corners were found to be against where they are said to be: the calibration has taken this into account.",
+        lambda evaluation: figures.target_shape(evaluation.calibration),
+        suits=lambda evaluation: evaluation.calibration.target_shape.kind != "flat",
     ),
     Plate(
         "coverage",
@@ -71,4 +95,16 @@ PLATES = (
         "How far the lens moves each place from its ideal image; arrows show whereto, not to scale. Grey places have no ray.",
         lambda evaluation: figures.displacement_map(evaluation.calibration),
     ),
+    Plate(
+        "difference",
+        "Formula against free lens",
+        "How far the chosen formula sees from where the lens does that no formula limits, a common rotation apart: what the formula costs.",
+        lambda evaluation: _formula_against_free(evaluation.calibration),
+        suits=lambda evaluation: evaluation.calibration.free_camera is not None,
+    ),
 )
+
+
+def _formula_against_free(calibration: Calibration) -> Figure:
+    assert calibration.free_camera is not None  # the plate does not suit others
+    return figures.lens_difference(calibration.free_camera, calibration.camera)

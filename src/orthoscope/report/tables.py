@@ -13,11 +13,27 @@ import numpy as np
 from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.methods.calibration import Calibration
 from orthoscope.models.camera import Camera
-from orthoscope.models.lenses import LENSES
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.lenses import lens_name as lens_kind
 from orthoscope.report.field_of_view import field_of_view
-from orthoscope.report.numbers import ABSENT, degrees, percent, pixels, setting, value_with_deviation
+from orthoscope.report.numbers import ABSENT, degrees, percent, pixels, probability, setting, value_with_deviation
 
-__all__ = ["Card", "Parameter", "ViewRow", "cards", "lens_name", "lens_rows", "parameters", "settings_rows", "view_rows", "warnings"]
+__all__ = [
+    "CandidateRow",
+    "Card",
+    "MisfitRow",
+    "Parameter",
+    "ViewRow",
+    "candidate_rows",
+    "cards",
+    "lens_name",
+    "lens_rows",
+    "misfit_rows",
+    "parameters",
+    "settings_rows",
+    "view_rows",
+    "warnings",
+]
 
 ANGLES = ("tau_x", "tau_y", "w")  # coefficients in radians; all others have no unit
 
@@ -56,6 +72,34 @@ class ViewRow:
     suspicion: str
 
 
+@dataclass(frozen=True)
+class MisfitRow:
+    """A row of the table of misfits: of what, the part that views agree on and the part that they do not (px), F, F by chance, p-values.
+
+    moves: by how much the image of the camera is off for it, pixels, where that is known.
+    """
+
+    what: str
+    systematic: str
+    noise: str
+    f: str
+    chance: str
+    p_value: str
+    p_over_views: str
+    moves: str
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """A row of what was tried: target shape, lens, held-out error, its standard error and what it loses against the one taken, px."""
+
+    target: str
+    lens: str
+    held_out: str
+    standard_error: str
+    loses: str
+
+
 def cards(evaluation: Evaluation) -> list[Card]:
     """The key figures in the order of their weight."""
     detections = evaluation.calibration.detections
@@ -85,7 +129,8 @@ def parameters(calibration: Calibration) -> list[Parameter]:
     if camera.lens_frame is not None:
         rows += [(f"lens_{name}", getattr(camera.lens_frame, name), "px") for name in ("fx", "fy", "cx", "cy", "skew")]
     unused = _unused(calibration)
-    rows += [(name, getattr(camera.lens, name), "rad" if name in ANGLES else "") for name in camera.lens.names() if name not in unused]
+    coefficients = zip(camera.lens.names(), camera.lens.coefficients.tolist(), strict=True)
+    rows += [(name, value, "rad" if name in ANGLES else "") for name, value in coefficients if name not in unused]
     deviations = calibration.uncertainty.deviations
     return [Parameter(name, *_value(value, deviations.get(name), bool(deviations)), unit, repr(float(value))) for name, value, unit in rows]
 
@@ -109,6 +154,35 @@ def warnings(evaluation: Evaluation) -> list[str]:
     """The warnings that neither the assumptions nor the suspects say already."""
     said = [*evaluation.calibration.assumptions, *(reason for _, reason in evaluation.suspects)]
     return [sentence for sentence in evaluation.warnings if not any(words and words in sentence for words in said)]
+
+
+def misfit_rows(evaluation: Evaluation) -> list[MisfitRow]:
+    """The target against its description, and the lens against its formula."""
+    target, lens = evaluation.misfit.target, evaluation.misfit.lens
+    both = (("target", target.test, target.moves_camera_px), ("lens formula", lens.test, float("nan")))
+    return [
+        MisfitRow(
+            what,
+            pixels(test.systematic_px),
+            pixels(test.noise_px),
+            pixels(test.f),
+            pixels(test.chance),
+            probability(test.p_value),
+            probability(test.p_over_views),
+            pixels(moves),
+        )
+        for what, test, moves in both
+    ]
+
+
+def candidate_rows(calibration: Calibration) -> list[CandidateRow]:
+    """What the method tried, simplest first; nothing where it had no choice."""
+    rows = []
+    for one in calibration.candidates:
+        value, error = value_with_deviation(one.held_out_px, one.standard_error_px)
+        loses = "taken" if one.loses_px == 0.0 else pixels(one.loses_px)
+        rows.append(CandidateRow(one.target, one.lens, value, error, loses))
+    return rows
 
 
 def view_rows(evaluation: Evaluation) -> list[ViewRow]:
@@ -141,8 +215,9 @@ def settings_rows(calibration: Calibration) -> list[tuple[str, str]]:
 
 
 def lens_name(camera: Camera) -> str:
-    """The lens's name in the table of lenses, else its class's."""
-    return next((name for name, kind in LENSES.items() if type(camera.lens) is kind), type(camera.lens).__name__)
+    """The lens's name in the table of lenses, or what a free lens stands on."""
+    lens = camera.lens
+    return f"free, on {lens_kind(lens.base)}" if isinstance(lens, FreeLens) else lens_kind(lens)
 
 
 def _held_out(evaluation: Evaluation) -> Card:
@@ -169,4 +244,5 @@ def _value(value: float, deviation: float | None, some_estimated: bool) -> tuple
 def _unused(calibration: Calibration) -> list[str]:
     """Coefficients that the lens could have and does not: zero, and not estimated."""
     lens, estimated = calibration.camera.lens, calibration.uncertainty.deviations
-    return [name for name in lens.names() if name not in estimated and getattr(lens, name) == 0.0]
+    coefficients = zip(lens.names(), lens.coefficients.tolist(), strict=True)
+    return [name for name, value in coefficients if name not in estimated and value == 0.0]

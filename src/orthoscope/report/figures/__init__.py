@@ -4,10 +4,11 @@ Floor 6.  With experiments/figures.py the only place with matplotlib; importing 
 needed.
 """
 
+from orthoscope.report.figures.board import target_misfit, target_shape
 from orthoscope.report.figures.coverage import coverage
-from orthoscope.report.figures.lens import displacement_map, distortion_curve
+from orthoscope.report.figures.lens import displacement_map, distortion_curve, lens_difference
 from orthoscope.report.figures.photograph import photograph_uri
-from orthoscope.report.figures.residuals import residual_vectors, residuals_by_place, residuals_by_view
+from orthoscope.report.figures.residuals import lens_misfit, residual_vectors, residuals_by_place, residuals_by_view
 from orthoscope.report.figures.scene import board_poses
 from orthoscope.report.figures.style import to_svg
 
@@ -16,9 +17,13 @@ __all__ = [
     "coverage",
     "displacement_map",
     "distortion_curve",
+    "lens_difference",
+    "lens_misfit",
     "photograph_uri",
     "residual_vectors",
     "residuals_by_place",
     "residuals_by_view",
+    "target_misfit",
+    "target_shape",
     "to_svg",
 ]

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
+from orthoscope.evaluation.cells import Cells
 from orthoscope.evaluation.coverage import COVERAGE_GRID, cells_with_rays
 from orthoscope.geometry.arrays import Bool, ndarray
 from orthoscope.methods.calibration import Calibration
-from orthoscope.report.figures.cells import Cells
 from orthoscope.report.figures.style import BLUE, DENSE, EMPTY, RED, frame_figure, styled
 
 __all__ = ["coverage"]

@@ -2,7 +2,7 @@
 
 Floor 6.  The ideal image of a ray is its place in the lens's own chart through K: a pin-hole's image for lenses of the plane, an
 equidistant one (r = f theta) for lenses of the angle.  Displacement is image minus ideal, pixels; negative along the radius is
-barrel, positive is pincushion.  Both figures come from `project` and `unproject` alone, so any lens can be shown.
+barrel, positive is pincushion.  All figures come from `project` and `unproject` alone, so any lens can be shown.
 """
 
 from __future__ import annotations
@@ -11,13 +11,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from orthoscope.evaluation.difference import image_difference
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.calibration import Calibration
 from orthoscope.models.camera import Camera, image_border
 from orthoscope.models.charts import GNOMONIC
-from orthoscope.report.figures.style import BLUE, EMPTY, GREY, INK, ORANGE, RED, WIDTH, frame_figure, note, styled
+from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, RED, WIDTH, frame_figure, note, styled
+from orthoscope.report.figures.vector_map import vector_map
 
-__all__ = ["displacement_map", "distortion_curve"]
+__all__ = ["displacement_map", "distortion_curve", "lens_difference"]
 
 DIRECTIONS = 48  # around the axis
 BEYOND = 1.12  # the curve is drawn this much farther than the frame's farthest corner
@@ -56,22 +58,39 @@ def distortion_curve(calibration: Calibration) -> Figure:
 def displacement_map(calibration: Calibration) -> Figure:
     """How far, and whereto, the lens moves each place of the frame from its ideal image (px); grey where no ray falls."""
     camera = calibration.camera
-    figure, axes = frame_figure(camera.image_size)
-    axes.set_facecolor(EMPTY)
-    x, y, moved = _moved(camera, 240)
-    size = np.hypot(moved[..., 0], moved[..., 1])
-    if not np.isfinite(size).any():
-        note(axes, "no pixel of the frame has a ray")
-        return figure
-    shown = axes.pcolormesh(x, y, np.ma.masked_invalid(size), cmap="cividis", vmin=0.0, shading="nearest", rasterized=True)
     ideal = "pin-hole" if camera.lens.chart is GNOMONIC else "equidistant"
-    figure.colorbar(shown, ax=axes, label=f"displacement from the {ideal} image (px)", pad=0.02, shrink=0.9, aspect=32)
-    if np.nanmax(size) > 1e-9:
-        _contours(axes, camera)
-        _arrows(axes, camera)
+    figure, axes = frame_figure(camera.image_size)
+    vector_map(
+        figure,
+        axes,
+        camera.image_size,
+        field=lambda pixels: pixels - _ideal(camera, camera.unproject(pixels)),
+        label=f"displacement from the {ideal} image (px)",
+        empty="no pixel of the frame has a ray",
+    )
+    _principal_point(axes, camera)
+    return figure
+
+
+@styled
+def lens_difference(camera: Camera, other: Camera) -> Figure:
+    """How far, and whereto, `other` sees what `camera` sees at each place of its frame (px), a common rotation apart."""
+    figure, axes = frame_figure(camera.image_size)
+    vector_map(
+        figure,
+        axes,
+        camera.image_size,
+        field=lambda pixels: image_difference(camera, other, pixels),
+        label="difference between the two (px)",
+        empty="no pixel has a ray in both",
+    )
+    _principal_point(axes, camera)
+    return figure
+
+
+def _principal_point(axes: Axes, camera: Camera) -> None:
     axes.plot(camera.intrinsics.cx, camera.intrinsics.cy, "+", color=ORANGE, ms=10, mew=1.6, label="principal point")
     axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.2)
-    return figure
 
 
 def _ideal(camera: Camera, rays: Float[ndarray, "n 3"]) -> Float[ndarray, "n 2"]:
@@ -126,46 +145,6 @@ def _marks(axes: Axes, calibration: Calibration, last: float, edge: float) -> No
             axes.axvline(np.rad2deg(angle), color=colour, lw=1.1, label=f"{words}, {np.rad2deg(angle):.1f}°")
     if np.isfinite(seen):
         axes.axvspan(np.rad2deg(seen), np.rad2deg(last), color=ORANGE, alpha=0.09, linewidth=0)
-
-
-def _contours(axes: Axes, camera: Camera) -> None:
-    """Lines of equal displacement, labelled in pixels."""
-    x, y, moved = _moved(camera, 80)
-    size = np.ma.masked_invalid(np.hypot(moved[..., 0], moved[..., 1]))
-    lines = axes.contour(x, y, size, levels=7, colors="white", linewidths=0.7, alpha=0.9)
-    axes.clabel(lines, fmt="%g px", fontsize=7)
-
-
-def _arrows(axes: Axes, camera: Camera) -> None:
-    """Directions on a coarse grid, the longest as long as a step of the grid; the contours say how far."""
-    x, y, moved = _moved(camera, 13)
-    longest = float(np.nanmax(np.hypot(moved[..., 0], moved[..., 1]), initial=0.0))
-    if longest > 0:
-        axes.quiver(
-            x,
-            y,
-            *np.moveaxis(moved, -1, 0),
-            angles="xy",
-            scale_units="xy",
-            scale=longest / (x[1] - x[0]),
-            pivot="mid",
-            color="white",
-            alpha=0.75,
-            width=0.003,
-        )
-
-
-def _moved(camera: Camera, samples: int) -> tuple[ndarray, ndarray, ndarray]:
-    """x and y of a grid over the frame, pixels, and at each place image minus ideal (rows, columns, 2); NaN where there is no ray.
-
-    samples: along the frame's longer side.
-    """
-    width, height = camera.image_size
-    columns, rows = (max(2, round(samples * side / max(width, height))) for side in camera.image_size)
-    x = (np.arange(columns) + 0.5) / columns * width - 0.5
-    y = (np.arange(rows) + 0.5) / rows * height - 0.5
-    pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return x, y, (pixels - _ideal(camera, camera.unproject(pixels))).reshape(rows, columns, 2)
 
 
 def _outline(camera: Camera) -> Float[ndarray, "n 2"]:

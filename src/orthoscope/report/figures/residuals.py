@@ -6,19 +6,18 @@ Corners that the camera gives no image (NaN) are left out.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from orthoscope.evaluation.cells import cells_for
 from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.calibration import Calibration
-from orthoscope.report.figures.cells import cells_for
+from orthoscope.report.figures.arrows import frame_key, round_magnification, true_to_scale
 from orthoscope.report.figures.style import BLUE, DENSE, EMPTY, INK, ORANGE, RED, frame_figure, note, styled
 
-__all__ = ["residual_vectors", "residuals_by_place", "residuals_by_view"]
+__all__ = ["lens_misfit", "residual_vectors", "residuals_by_place", "residuals_by_view"]
 
 NAMED = 60  # photographs; with more of them the axis carries their numbers
 FEWEST = 4  # corners in a cell below which its mean says nothing
@@ -36,7 +35,7 @@ def residual_vectors(calibration: Calibration) -> Figure:
     order = np.argsort(size, kind="stable")  # the longest on top
     top = max(float(np.quantile(size, 0.98)), 1e-12)
     many = len(pixels) > DENSE
-    magnification = _magnification(size, calibration.camera.image_size, share=0.02 if many else 0.03)
+    magnification = round_magnification(size, _diagonal(calibration), share=0.02 if many else 0.03)
     arrows = axes.quiver(
         *pixels[order].T,
         *residuals[order].T,
@@ -44,11 +43,11 @@ def residual_vectors(calibration: Calibration) -> Figure:
         cmap="viridis_r",
         clim=(0.0, top),
         width=0.0016 if many else 0.0022,
-        **_true_to_scale(magnification),
+        **true_to_scale(magnification),
         rasterized=many,
     )
     figure.colorbar(arrows, ax=axes, label="residual (px)", extend="max", pad=0.02, shrink=0.9, aspect=32)
-    _key(axes, calibration.camera.image_size, magnification, "each residual")
+    frame_key(axes, calibration.camera.image_size, magnification, "each residual")
     return figure
 
 
@@ -70,10 +69,29 @@ def residuals_by_place(evaluation: Evaluation) -> Figure:
     )
     figure.colorbar(shown, ax=axes, label=f"{kind} rms (px per point)", pad=0.02, shrink=0.9, aspect=32)
     means = np.stack([cells.mean(pixels, residuals[:, i])[told] for i in range(2)], axis=-1)
-    magnification = _magnification(np.hypot(*means.T), calibration.camera.image_size, share=0.035)
-    arrows = axes.quiver(*cells.centres[told].T, *means.T, color="white", width=0.0045, **_true_to_scale(magnification))
-    arrows.set(edgecolor=INK, linewidth=0.35)
-    _key(axes, calibration.camera.image_size, magnification, "mean residual")
+    _mean_arrows(axes, calibration, cells.centres[told], means, "mean residual")
+    return figure
+
+
+@styled
+def lens_misfit(evaluation: Evaluation) -> Figure:
+    """What the views agree on at each place of the image, whatever corner is there, px: what the formula cannot follow."""
+    misfit, image_size = evaluation.misfit.lens, evaluation.calibration.camera.image_size
+    figure, axes = frame_figure(image_size)
+    axes.set_facecolor(EMPTY)
+    size = np.hypot(misfit.residuals[..., 0], misfit.residuals[..., 1])
+    if np.isnan(misfit.test.f):
+        note(axes, "too few views to tell")
+        return figure
+    if not np.nanmax(size, initial=0.0) > 0.0:
+        note(axes, "the views agree on nothing: only noise")
+        return figure
+    x, y = misfit.cells.x_edges, misfit.cells.y_edges
+    top = max(float(np.nanmax(size)), misfit.test.noise_px)  # what noise hides looks pale
+    shown = axes.pcolormesh(x, y, np.ma.masked_invalid(size), cmap="viridis_r", vmin=0.0, vmax=top, edgecolors="face", linewidth=0.2)
+    figure.colorbar(shown, ax=axes, label="systematic residual (px)", pad=0.02, shrink=0.9, aspect=32)
+    told = np.isfinite(size)
+    _mean_arrows(axes, evaluation.calibration, misfit.cells.centres[told], misfit.residuals[told], "systematic residual")
     return figure
 
 
@@ -145,30 +163,13 @@ def _fairest(evaluation: Evaluation) -> tuple[str, Float[ndarray, "n 2"], Float[
     return "training", *_finite(evaluation.calibration, evaluation.calibration.residuals())
 
 
-def _magnification(size: ndarray, image_size: tuple[int, int], *, share: float) -> float:
-    """A round number that draws a long residual (the ninth in ten) at about `share` of the frame's diagonal."""
-    typical = float(np.quantile(size, 0.9))
-    return _round_below(share * float(np.hypot(*image_size)) / typical) if typical > 1e-12 else 1.0
+def _mean_arrows(axes: Axes, calibration: Calibration, places: ndarray, means: ndarray, words: str) -> None:
+    """White arrows (n,2) at places (n,2), pixels, with their key."""
+    magnification = round_magnification(np.hypot(*means.T), _diagonal(calibration), share=0.035)
+    arrows = axes.quiver(*places.T, *means.T, color="white", width=0.0045, **true_to_scale(magnification))
+    arrows.set(edgecolor=INK, linewidth=0.35)
+    frame_key(axes, calibration.camera.image_size, magnification, words)
 
 
-def _round_below(value: float) -> float:
-    """The largest of ..., 1, 2, 5, 10, 20, ... not above value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(m * power for m in (1.0, 2.0, 5.0) if m * power <= value * (1 + 1e-12)))
-
-
-def _true_to_scale(magnification: float) -> dict[str, Any]:
-    """What makes quiver draw vectors in pixels of the frame, y down as the axes are."""
-    return {"angles": "xy", "scale_units": "xy", "scale": 1.0 / magnification, "pivot": "tail"}
-
-
-def _key(axes: Axes, image_size: tuple[int, int], magnification: float, words: str) -> None:
-    """The scale: an arrow of a round length, up to a tenth of the frame's diagonal, above the frame.
-
-    Not by `quiverkey`, which before matplotlib 3.9 draws as many arrows as the figure has.
-    """
-    width, height = image_size
-    length = _round_below(0.1 * float(np.hypot(width, height)) / magnification)
-    x, y = 0.01 * width, -0.035 * height
-    axes.quiver([x], [y], [length], [0.0], color=INK, width=0.003, clip_on=False, **_true_to_scale(magnification))
-    axes.text(x + magnification * length + 0.015 * width, y, f"{length:g} px   ({words}, magnified {magnification:g} times)", va="center")
+def _diagonal(calibration: Calibration) -> float:
+    return float(np.hypot(*calibration.camera.image_size))

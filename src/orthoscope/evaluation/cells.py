@@ -1,6 +1,6 @@
 """The photograph's frame in nearly square cells, and what falls into each.
 
-Floor 6.  Values arrive one for each corner; cells without corners are NaN, as everywhere.
+Floor 4.  Values arrive one for each corner; cells without corners are NaN, as everywhere.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, Int, ndarray
+
+__all__ = ["Cells", "cells_for"]
 
 __all__ = ["Cells", "cells_for"]
 

@@ -1,0 +1,129 @@
+"""Do residuals agree from view to view, beyond chance?  The F test and the vote of the views that misfit.py derives.
+
+Floor 4.  Matrices are inverted with their columns scaled to length 1 and FAINT added to the diagonal: a direction that is as faint as that
+once other columns are granted counts as none, and the rank is the trace of G (G + FAINT)^-1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.evaluation.columns import Columns
+from orthoscope.evaluation.f_distribution import f_survival
+from orthoscope.geometry.arrays import Float, ndarray
+
+__all__ = ["Agreement", "MisfitTest", "agreement"]
+
+FAINT = 1e-8  # squared share of a column: what is left of it after elimination is rounding when it is no more
+FEWEST_VIEWS = 3  # with fewer, "the same in all views" means nothing
+FEWEST_WITHIN = 10  # degrees of freedom left for the noise
+ALL_SIGNS = 11  # views up to which every combination of signs is tried; with more, as many at random
+
+
+@dataclass(frozen=True)
+class MisfitTest:
+    """Whether residuals agree from view to view, and by how much.
+
+    f, between, within: F and its degrees of freedom; chance: the F that these residuals have without any agreement between views.
+    p_value: of F for independent normal noise; p_over_views: for any noise that differs from view to view.  systematic_px: the part
+    that agrees, noise_px: the part that does not, both rms per point.  NaN where the views do not suffice for a test.
+    """
+
+    f: float
+    between: float
+    within: float
+    chance: float
+    p_value: float
+    p_over_views: float
+    systematic_px: float
+    noise_px: float
+
+
+class Agreement(NamedTuple):
+    """What `agreement` finds: the test, and the unknowns (columns,) of the tested block, their noise shrunk away."""
+
+    test: MisfitTest
+    unknowns: ndarray
+
+
+def agreement(columns: Columns, tested: int, granted: list[int]) -> Agreement:
+    """Test one block of columns with other blocks, and the poses, granted; NaN, and unknowns 0, where the views do not suffice."""
+    B, A = columns.places[tested], np.concatenate([columns.places[i] for i in granted])
+    inverse, rank_A = _inverse(columns.gram[np.ix_(A, A)], np.diag(columns.gram)[A])
+    onto_A = inverse @ columns.gram[np.ix_(A, B)]
+    left = columns.without(granted, inverse @ columns.scores(columns.residual)[:, A].sum(0))
+    scores = columns.scores(left)
+    of_B = scores[:, B] - scores[:, A] @ onto_A
+    gram_B = columns.gram[np.ix_(B, B)] - columns.gram[np.ix_(B, A)] @ onto_A
+    inverse_B, rank_B = _inverse(gram_B, np.diag(columns.gram)[B])
+    within = 2 * len(left) - columns.poses_rank - rank_A - rank_B
+    if columns.views < FEWEST_VIEWS or within < FEWEST_WITHIN or rank_B < 1:
+        return Agreement(MisfitTest(*[float("nan")] * 8), np.zeros(len(B)))
+    of_views = _Squares(
+        by_B=of_B @ inverse_B @ of_B.T, by_A=scores[:, A] @ inverse @ scores[:, A].T, energy=float((left * left).sum()), corners=len(left)
+    )
+    test = _voted(of_views, rank_B, within)
+    return Agreement(test, _shrunk(gram_B, of_B.sum(0), test, len(left)))
+
+
+class _Squares(NamedTuple):
+    """What the tested and the granted columns explain of the residuals of views i and j together (v,v); all squares; number of corners."""
+
+    by_B: ndarray
+    by_A: ndarray
+    energy: float
+    corners: int
+
+
+def _voted(squares: _Squares, between: float, within: float) -> MisfitTest:
+    """F as it is and with views turned round."""
+    views = len(squares.by_B)
+    signs = _signs(views)
+    by_A, by_B = _of_signs(signs, squares.by_A), _of_signs(signs, squares.by_B)
+    ratios = by_B / between / np.maximum((squares.energy - by_A - by_B) / within, 1e-300)
+    f, chance = float(ratios[0]), float(ratios[1:].mean())
+    variance = max(squares.energy - float(by_B[0]), 0.0) / within
+    excess = max(f - max(chance, 1.0), 0.0) * between * variance
+    return MisfitTest(
+        f=f,
+        between=between,
+        within=within,
+        chance=chance,
+        p_value=f_survival(f, between, within),
+        p_over_views=float((ratios >= f * (1.0 - 1e-9)).mean()),
+        systematic_px=float(np.sqrt(views / (views - 1) * excess / squares.corners)),
+        noise_px=float(np.sqrt(2.0 * variance)),
+    )
+
+
+def _shrunk(gram: Float[ndarray, "c c"], score: Float[ndarray, " c"], test: MisfitTest, corners: int) -> Float[ndarray, " c"]:
+    """The unknowns as normal numbers would be expected whose spread makes the systematic part, seen through the noise."""
+    if not test.systematic_px > 0.0:
+        return np.zeros(len(score))
+    spread = test.systematic_px**2 * corners / np.trace(gram)
+    return np.linalg.solve(gram + 0.5 * max(test.chance, 1.0) * test.noise_px**2 / spread * np.eye(len(gram)), score)
+
+
+def _inverse(gram: Float[ndarray, "c c"], whole: Float[ndarray, " c"]) -> tuple[Float[ndarray, "c c"], float]:
+    """The inverse of an eliminated gram matrix, and its rank.  whole: its diagonal before elimination, the columns' squared lengths."""
+    scale = np.sqrt(np.where(whole > 0.0, whole, 1.0))
+    inverse = np.linalg.inv(gram / np.outer(scale, scale) + FAINT * np.eye(len(gram)))
+    return inverse / np.outer(scale, scale), float(len(gram) - FAINT * np.trace(inverse))
+
+
+def _signs(views: int) -> Float[ndarray, "s v"]:
+    """Signs for the views, none turned first; all that differ by more than a common sign, or as many at random (default_rng(0))."""
+    if views <= ALL_SIGNS:
+        bits = np.arange(2 ** (views - 1))[:, None] >> np.arange(views)
+        return 1.0 - 2.0 * (bits & 1)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (2 ** (ALL_SIGNS - 1), views))
+    signs[0] = 1.0
+    return signs
+
+
+def _of_signs(signs: Float[ndarray, "s v"], gram: Float[ndarray, "v v"]) -> Float[ndarray, " s"]:
+    """s^T gram s of each row of signs."""
+    return ((signs @ gram) * signs).sum(1)
