@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from orthoscope.geometry.arrays import InputError, frozen, normalised
-from orthoscope.geometry.target import Detections, SetAside, Target, View, chessboard, parse_length, parse_target
+from orthoscope.geometry.target import Detections, Outlier, SetAside, Target, View, chessboard, parse_length, parse_target
 
 BOARD = chessboard(9, 6, 0.025)
 
@@ -118,6 +118,13 @@ def test_a_choice_of_views_keeps_everything_else():
     assert [entry.image for entry in chosen.views] == ["c.jpg", "a.jpg"]
     assert chosen.target is BOARD
     assert chosen.set_aside == (SetAside("d.jpg", "no board"),)
+
+
+def test_a_choice_of_views_keeps_the_outliers_of_those_views():
+    outliers = (Outlier("a.jpg", 7, (1.0, 2.0), "9 px off"), Outlier("b.jpg", 8, (3.0, 4.0), "5 px off"))
+    detections = Detections(BOARD, (640, 480), (view("a.jpg"), view("b.jpg")), outliers=outliers)
+    assert detections.only([1]).outliers == outliers[1:]
+    assert detections.only([]).outliers == ()
 
 
 def test_what_is_handed_in_can_be_changed_afterwards():

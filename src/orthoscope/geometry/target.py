@@ -14,7 +14,7 @@ import numpy as np
 
 from orthoscope.geometry.arrays import InputError, frozen, ndarray
 
-__all__ = ["Detections", "SetAside", "Target", "View", "chessboard", "parse_length", "parse_target"]
+__all__ = ["Detections", "Outlier", "SetAside", "Target", "View", "chessboard", "parse_length", "parse_target"]
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 
@@ -74,11 +74,24 @@ class SetAside(NamedTuple):
     reason: str
 
 
+class Outlier(NamedTuple):
+    """A corner that was found but takes no part, and why.
+
+    image: the photograph's name.  id: row of the target's points.  pixel: (x, y), where it was seen.
+    """
+
+    image: str
+    id: int
+    pixel: tuple[float, float]
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class Detections:
     """One target seen by one camera in several photographs.
 
     image_size: (width, height) pixels.  set_aside: photographs without a view, with the reason.
+    outliers: corners that were found and are in no view, with the reason.
     Raises InputError for a repeated image name or a corner that the target does not have.
     """
 
@@ -86,6 +99,7 @@ class Detections:
     image_size: tuple[int, int]
     views: tuple[View, ...]
     set_aside: tuple[SetAside, ...] = ()
+    outliers: tuple[Outlier, ...] = ()
 
     def __post_init__(self) -> None:
         width, height = (int(side) for side in self.image_size)
@@ -94,6 +108,7 @@ class Detections:
         object.__setattr__(self, "image_size", (width, height))
         object.__setattr__(self, "views", tuple(self.views))
         object.__setattr__(self, "set_aside", tuple(SetAside(*entry) for entry in self.set_aside))
+        object.__setattr__(self, "outliers", tuple(Outlier(*entry) for entry in self.outliers))
         seen: set[str] = set()
         for view in self.views:
             if view.image in seen:
@@ -111,8 +126,10 @@ class Detections:
         return sum(len(view.ids) for view in self.views)
 
     def only(self, indices: Sequence[int] | ndarray) -> Detections:
-        """The same, with the views of these indices only (nothing is set aside by it)."""
-        return replace(self, views=tuple(self.views[i] for i in indices))
+        """The same, with the views of these indices and their outliers only (nothing is set aside by it)."""
+        views = tuple(self.views[i] for i in indices)
+        images = {view.image for view in views}
+        return replace(self, views=views, outliers=tuple(outlier for outlier in self.outliers if outlier.image in images))
 
 
 def chessboard(columns: int, rows: int, square: float) -> Target:
