@@ -26,6 +26,7 @@ Example:
 @options.target
 @options.image_size
 @options.jobs
+@options.cluster
 @click.option(
     "-o",
     "--out",
@@ -35,8 +36,17 @@ Example:
     help="File to write.",
 )
 @options.as_json
-def detect(photos: tuple[str, ...], target: str, image_size: tuple[int, int] | None, jobs: int | None, out: Path, as_json: bool) -> None:
+def detect(
+    photos: tuple[str, ...],
+    target: str,
+    image_size: tuple[int, int] | None,
+    jobs: int | None,
+    cluster: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
     """Find the target's corners in photographs (or turn a corners.vnl table into detections.json)."""
+    from orthoscope.cli.executors import threads
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import to_json
     from orthoscope.io.files import check_folder
@@ -44,8 +54,8 @@ def detect(photos: tuple[str, ...], target: str, image_size: tuple[int, int] | N
     from orthoscope.io.own_json import save
 
     check_folder(out.parent)
-    with bar("detecting") as progress:
-        detections, _ = detections_from(photos, target, image_size=image_size, jobs=jobs, progress=progress)
+    with threads(jobs, cluster) as executor, bar("detecting") as progress:
+        detections, _ = detections_from(photos, target, image_size=image_size, executor=executor, progress=progress)
     save(detections, out)
     width, height = detections.image_size
     used, aside = detections.views, detections.set_aside

@@ -32,6 +32,7 @@ Examples:
 @options.image_size
 @options.folds
 @options.jobs
+@options.cluster
 @options.as_json
 def evaluate(
     calibration: Path,
@@ -40,9 +41,11 @@ def evaluate(
     image_size: tuple[int, int] | None,
     folds: int,
     jobs: int | None,
+    cluster: str | None,
     as_json: bool,
 ) -> None:
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
+    from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
     from orthoscope.evaluation.evaluate import evaluate as judge
@@ -52,12 +55,13 @@ def evaluate(
 
     loaded = load_calibration(calibration)
     if not others:
-        with bar("holding out") as progress:
-            evaluation = judge(loaded, folds=folds, progress=progress)
+        with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
+            evaluation = judge(loaded, folds=folds, executor=executor, progress=progress)
         click.echo(to_json(evaluation_numbers(evaluation)) if as_json else "\n".join(evaluation_lines(evaluation)))
         return
-    with bar("detecting") as progress:
-        detections, _ = detections_from(others, target or loaded.detections.target, image_size=image_size, jobs=jobs, progress=progress)
+    with threads(jobs, cluster) as executor, bar("detecting") as progress:
+        board = target or loaded.detections.target
+        detections, _ = detections_from(others, board, image_size=image_size, executor=executor, progress=progress)
     test = evaluate_on(loaded.camera, detections)
     if as_json:
         rejected = [{"name": entry.image, "reason": entry.reason} for entry in test.detections.set_aside]

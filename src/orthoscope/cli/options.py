@@ -14,6 +14,7 @@ import click
 __all__ = [
     "as_json",
     "calibration_file",
+    "cluster",
     "folds",
     "image_size",
     "jobs",
@@ -22,6 +23,7 @@ __all__ = [
     "loss",
     "method",
     "photos",
+    "shape",
     "skew",
     "target",
 ]
@@ -58,29 +60,42 @@ lens: Decorator = click.option(
     default="auto",
     show_default=True,
     metavar="NAME",
-    help="brown, rational, kannala_brandt, division, fov, pfet, fet; brown:k1,k2 frees just these; "
-    "auto takes brown, or kannala_brandt for wide views.",
+    help="free (a formula and a spline on top), brown, rational, kannala_brandt, division, fov, pfet, fet; brown:k1,k2 frees just these; "
+    "auto takes what the method takes: decoupled the free lens, fccm brown, or kannala_brandt for wide views.",
 )
 method: Decorator = click.option(
     "--method",
-    default="fccm",
+    default="decoupled",
     show_default=True,
     metavar="NAME",
-    help="How to calibrate: fccm (jointly), nmldc (straight lines first) or mldc (the paper's).",
+    help="How to calibrate: decoupled (target's shape and a free lens first), fccm (jointly, the target flat), nmldc (straight lines "
+    "first) or mldc (the paper's).",
+)
+shape: Decorator = click.option(
+    "--shape",
+    metavar="KIND",
+    help="The target's shape, for decoupled: flat (as it is said to be), smooth (stretched, bent) or free (each corner by itself); by "
+    "default what foresees best.",
 )
 skew: Decorator = click.option("--skew", is_flag=True, help="Let the pixel axes be oblique.")
 loss: Decorator = click.option(
     "--loss",
-    default="linear",
-    show_default=True,
     metavar="NAME",
-    help="linear, huber or cauchy; the last two forgive gross errors beyond 1 px.",
+    help="For fccm, nmldc and mldc: linear, huber or cauchy; the last two forgive gross errors beyond 1 px. decoupled finds its own.",
 )
 folds: Decorator = click.option(
     "--folds", default=5, show_default=True, type=click.IntRange(2), help="Parts that the views are held out in."
 )
 jobs: Decorator = click.option(
-    "--jobs", type=click.IntRange(1), help="Photographs read at the same time; by default as many as there are cores."
+    "--jobs",
+    type=click.IntRange(1),
+    help="How much is done at the same time: photographs, by default as many as there are cores; folds, by default one.",
+)
+cluster: Decorator = click.option(
+    "--cluster",
+    metavar="ADDRESS",
+    help="Instead of --jobs: the Dask scheduler, such as tcp://192.168.1.5:8786, whose workers see the same files "
+    "(pip install 'orthoscope[cluster]').",
 )
 keep: Decorator = click.option(
     "--keep",

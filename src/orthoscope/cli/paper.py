@@ -1,15 +1,10 @@
 """`orthoscope paper`: the paper's section 4, whole: one page and CSV files.
 
-The floor of the command line.  Processes are started here and handed down as an executor; each computes with one thread.
+The floor of the command line.  Its trials run in processes, each of which computes with one thread.
 """
 
 from __future__ import annotations
 
-import os
-import signal
-from collections.abc import Iterator
-from concurrent.futures import Executor
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -29,8 +24,6 @@ Examples:
 Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 """
 
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-
 
 @click.command(epilog=EXAMPLE)
 @click.option("--photos", multiple=True, metavar="PHOTOS", help="Photographs, or corners found before, for Fig. 6, Fig. 7 and Table 1.")
@@ -39,6 +32,7 @@ ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 @click.option("--trials", type=click.IntRange(1), help="Averaged in figures 2 to 5; 25, or 2 with --quick.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of all that is random.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes; by default as many as there are cores. 1 starts none.")
+@options.cluster
 @click.option("--quick", is_flag=True, help="Few levels and trials: a look at everything in seconds.")
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("paper"), show_default=True, help="Folder to write."
@@ -50,11 +44,14 @@ def paper(
     trials: int | None,
     seed: int,
     jobs: int | None,
+    cluster: str | None,
     quick: bool,
     out: Path,
 ) -> None:
     """Repeat the paper's experiments, each figure beside what the paper claims about it."""
-    with _single_threads():
+    from orthoscope.cli.executors import processes, single_threaded, threads
+
+    with single_threaded():
         from orthoscope.cli.progress import bar
         from orthoscope.experiments.documents import documents
         from orthoscope.experiments.section4 import Plan, run
@@ -66,45 +63,12 @@ def paper(
         if photos:
             from orthoscope.io.inputs import detections_from
 
-            with bar("detecting") as progress:
-                detections, files = detections_from(photos, target, image_size=image_size, jobs=jobs, progress=progress)
-        with _processes(jobs or os.cpu_count() or 1) as executor, bar("experiments") as progress:
+            with threads(jobs, cluster) as executor, bar("detecting") as progress:
+                detections, files = detections_from(photos, target, image_size=image_size, executor=executor, progress=progress)
+        with processes(jobs, cluster) as executor, bar("experiments") as progress:
             results = run(plan, detections=detections, executor=executor, progress=progress)
         written = documents(results, files)
         for name, text in written.texts.items():
             write_text(out / name, text)
     click.echo(written.headline)
     click.echo(f"wrote      {out / written.page} and {len(written.texts) - 1} CSV files")
-
-
-@contextmanager
-def _single_threads() -> Iterator[None]:
-    """Lets numpy compute with one thread where it is not loaded yet: sums then do not depend on the machine's cores."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-@contextmanager
-def _processes(jobs: int) -> Iterator[Executor | None]:
-    """So many fresh processes; none for one job.  Ctrl-C is for this process alone: the others finish a trial and then go."""
-    if jobs == 1:
-        yield None
-        return
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
-
-    ignore = (signal.SIGINT, signal.SIG_IGN)
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), signal.signal, ignore) as executor:
-        try:
-            yield executor
-        except BaseException:
-            executor.shutdown(wait=False, cancel_futures=True)
-            raise

@@ -25,11 +25,14 @@ Example:
 @click.option("--photos", multiple=True, metavar="PHOTOS", help="The photographs, to show one before and after.")
 @options.folds
 @options.keep
+@options.jobs
+@options.cluster
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("report.html"), show_default=True, help="File to write."
 )
-def report(calibration: Path, photos: tuple[str, ...], folds: int, keep: str, out: Path) -> None:
+def report(calibration: Path, photos: tuple[str, ...], folds: int, keep: str, jobs: int | None, cluster: str | None, out: Path) -> None:
     """Write the report page of a calibration: one HTML file that needs nothing else."""
+    from orthoscope.cli.executors import processes
     from orthoscope.cli.progress import bar
     from orthoscope.evaluation.evaluate import evaluate
     from orthoscope.io.files import check_folder
@@ -41,7 +44,7 @@ def report(calibration: Path, photos: tuple[str, ...], folds: int, keep: str, ou
     loaded = load_calibration(calibration)
     check_folder(out.parent)
     files = {path.name: path for path in photographs(photos)} if photos else {}
-    with bar("holding out") as progress:
-        evaluation = evaluate(loaded, folds=folds, progress=progress)
+    with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
+        evaluation = evaluate(loaded, folds=folds, executor=executor, progress=progress)
     write_report(evaluation, out, photograph=before_and_after(loaded, files, keep=keep))
     click.echo(f"wrote      {out}")

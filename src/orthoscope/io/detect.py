@@ -60,7 +60,8 @@ def detect(
     names = names_of(files)
     looks: list[_Look] = []
     with nullcontext(executor) if executor else ThreadPoolExecutor(jobs or os.cpu_count()) as run:
-        for look in run.map(_look, files, [target] * len(files), [detector] * len(files)):
+        places = [file.absolute() for file in files]  # an executor's workers may stand in another folder
+        for look in run.map(_look, places, [target] * len(files), [detector] * len(files)):
             looks.append(look)
             if progress:
                 progress(len(looks), len(files), names[len(looks) - 1])

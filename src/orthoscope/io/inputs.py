@@ -6,6 +6,7 @@ Floor 5.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 
 from orthoscope.geometry.arrays import InputError
@@ -24,12 +25,13 @@ def detections_from(
     *,
     image_size: tuple[int, int] | None = None,
     jobs: int | None = None,
+    executor: Executor | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> tuple[Detections, dict[str, Path]]:
     """Detections, and where the photograph of each name is (empty where corners were found before).
 
     paths: photographs (files, folders, globs), or one .json of ours, or one .vnl.  target: needed but for our own file.  image_size:
-    needed with a .vnl, which does not know it.
+    needed with a .vnl, which does not know it.  jobs, executor, progress: as in `detect`.
     Raises InputError where something needed is missing.
     """
     if len(paths) == 1 and Path(paths[0]).suffix == ".json":
@@ -42,4 +44,4 @@ def detections_from(
             raise InputError(f"{paths[0]} does not say how large the photographs are; add their size, such as --image-size 640x480.")
         return read_vnl(paths[0], target, image_size), {}
     files = photographs(paths)
-    return detect(files, target, jobs=jobs, progress=progress), dict(zip(names_of(files), files, strict=True))
+    return detect(files, target, jobs=jobs, executor=executor, progress=progress), dict(zip(names_of(files), files, strict=True))
