@@ -15,7 +15,7 @@ from numpy.testing import assert_array_equal
 from laws import for_every_lens
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.geometry.target import Detections, SetAside, Target, View, chessboard
+from orthoscope.geometry.target import Detections, Outlier, SetAside, Target, View, chessboard
 from orthoscope.io.json_layout import lay_out
 from orthoscope.io.own_json import load, load_calibration, load_camera, load_detections, save
 from orthoscope.methods.calibration import Calibration, Uncertainty
@@ -31,7 +31,8 @@ def some_detections(views: int = 3) -> Detections:
     seen = [
         View(f"left {i}.jpg", ids := generator.permutation(12)[: 12 - i], generator.uniform(0, 400, (len(ids), 2))) for i in range(views)
     ]
-    return Detections(BOARD, (640, 480), tuple(seen), (SetAside("blurred “ä”.jpg", 'no chessboard "4x3" found'),))
+    aside = (SetAside("blurred “ä”.jpg", 'no chessboard "4x3" found'),)
+    return Detections(BOARD, (640, 480), tuple(seen), aside, (Outlier("left 1.jpg", 11, (1 / 3, 1e-17), "14.2 px from the rest"),))
 
 
 def some_calibration() -> Calibration:
@@ -52,7 +53,7 @@ def some_calibration() -> Calibration:
 
 
 def assert_same_detections(a: Detections, b: Detections) -> None:
-    assert (a.image_size, a.set_aside) == (b.image_size, b.set_aside)
+    assert (a.image_size, a.set_aside, a.outliers) == (b.image_size, b.set_aside, b.outliers)
     assert (a.target.name, a.target.grid) == (b.target.name, b.target.grid)
     assert_array_equal(a.target.points, b.target.points)
     for line_a, line_b in zip(a.target.lines, b.target.lines, strict=True):
@@ -74,6 +75,12 @@ def assert_same_camera(a: Camera, b: Camera) -> None:
 def test_detections_come_back_to_the_last_bit(tmp_path):
     save(some_detections(), tmp_path / "detections.json")
     assert_same_detections(load_detections(tmp_path / "detections.json"), some_detections())
+
+
+def test_detections_without_outliers_say_nothing_of_them(tmp_path):
+    save(replace(some_detections(), outliers=()), tmp_path / "detections.json")
+    assert "outliers" not in (tmp_path / "detections.json").read_text()
+    assert load_detections(tmp_path / "detections.json").outliers == ()
 
 
 @given(st.lists(st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 2), max_size=12))

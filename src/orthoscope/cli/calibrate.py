@@ -37,13 +37,20 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @options.target
 @options.lens
 @options.method
+@options.shape
 @options.skew
 @options.loss
 @options.image_size
 @options.folds
 @options.jobs
+@options.cluster
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("camera"), show_default=True, help="Folder to write."
+)
+@click.option(
+    "--export",
+    metavar="TOOL",
+    help="Also write the camera for opencv, ros or kalibr, into OUT/camera-TOOL.yaml; --lens auto then takes a lens that the tool has.",
 )
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
 @options.keep
@@ -60,18 +67,22 @@ def calibrate_into(
     target: str | None,
     out: Path,
     lens: str = "auto",
-    method: str = "fccm",
+    method: str = "decoupled",
+    shape: str | None = None,
     skew: bool = False,
-    loss: str = "linear",
+    loss: str | None = None,
     image_size: tuple[int, int] | None = None,
     folds: int = 5,
     jobs: int | None = None,
+    cluster: str | None = None,
+    export: str | None = None,
     undistort: bool = False,
     keep: str = "all",
     report: bool = True,
     as_json: bool = False,
 ) -> Any:
     """The main job; prints the summary and returns the evaluation."""
+    from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
     from orthoscope.evaluation.evaluate import evaluate
@@ -79,26 +90,54 @@ def calibrate_into(
     from orthoscope.io.inputs import detections_from
     from orthoscope.io.own_json import save
     from orthoscope.methods import calibrate as run
+    from orthoscope.methods import settings_of
 
     check_folder(out)
-    with bar("detecting") as progress:
-        detections, files = detections_from(photos, target, image_size=image_size, jobs=jobs, progress=progress)
+    among = _lenses_of(export) if "among" in settings_of(method) else ()
+    given = {"lens": lens, "skew": skew, "target": shape, "loss": loss, "among": among or None}
+    given = {name: value for name, value in given.items() if value is not None}
+    with threads(jobs, cluster) as executor, bar("detecting") as progress:
+        detections, files = detections_from(photos, target, image_size=image_size, executor=executor, progress=progress)
     save(detections, out / "detections.json")
     written = [out / "detections.json"]
     with bar("calibrating") as progress:
-        calibration = run(detections, method=method, lens=lens, skew=skew, loss=loss)
-        evaluation = evaluate(calibration, folds=folds, progress=progress)
+        told = {"rehearsing": progress} if "rehearsing" in settings_of(method) else {}
+        calibration = run(detections, method=method, **given, **told)
+    with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
+        evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
     save(calibration, out / "calibration.json")
     written.append(out / "calibration.json")
+    if export:
+        written.append(_write_for(export, calibration, out))
     if report:
         written.append(_write_report(evaluation, files, out, keep=keep))
     if undistort:
-        written.append(_write_straight(evaluation, files, out, keep=keep, jobs=jobs))
+        written.append(_write_straight(evaluation, files, out, keep=keep, jobs=jobs, cluster=cluster))
     if as_json:
         click.echo(to_json(evaluation_numbers(evaluation)))
     else:
         click.echo("\n".join([*evaluation_lines(evaluation), "wrote      " + ", ".join(map(str, written))]))
     return evaluation
+
+
+def _lenses_of(tool: str | None) -> tuple[str, ...]:
+    """The lenses that a tool has; none where no tool is named."""
+    if tool is None:
+        return ()
+    from orthoscope.geometry.arrays import InputError
+    from orthoscope.io.export import EXPORTERS
+
+    if tool not in EXPORTERS:
+        raise InputError(f"no file for {tool!r} can be written; expected one of {', '.join(EXPORTERS)}.")
+    return EXPORTERS[tool].lenses
+
+
+def _write_for(tool: str, calibration: Any, out: Path) -> Path:
+    from orthoscope.io.export import export, exportable
+
+    path = out / f"camera-{tool}.yaml"
+    export(exportable(calibration.camera, tool, made_from=calibration).camera, path, tool)
+    return path
 
 
 def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str) -> Path:
@@ -109,9 +148,11 @@ def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: s
     return out / "report.html"
 
 
-def _write_straight(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None) -> Path:
+def _write_straight(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None) -> Path:
     from orthoscope.cli.undistort import straighten
     from orthoscope.geometry.arrays import InputError
+    from orthoscope.io.own_json import save
+    from orthoscope.io.undistort import straight_camera
 
     if not files:
         raise InputError(
@@ -119,5 +160,6 @@ def _write_straight(evaluation: Any, files: dict[str, Path], out: Path, *, keep:
         )
     calibration = evaluation.calibration
     paths = [files[view.image] for view in calibration.detections.views]
-    straighten(paths, calibration.camera, out / "undistorted", keep=keep, jobs=jobs)
+    straighten(paths, calibration.camera, out / "undistorted", keep=keep, jobs=jobs, cluster=cluster)
+    save(straight_camera(calibration.camera, keep=keep), out / "undistorted/camera.json")
     return out / "undistorted"

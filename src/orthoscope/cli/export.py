@@ -16,7 +16,12 @@ __all__ = ["export"]
 EXAMPLE = """\b
 Example:
   $ orthoscope export camera/calibration.json --to opencv -o camera.yaml
+  lens       brown instead of the free lens: 0.024 px apart on average where corners were seen, 0.16 px at most
   wrote      camera.yaml
+
+\b
+A formula is written exactly or not at all. opencv, ros and kalibr have no free lens: the nearest formula that they have is written, and
+the line above says what it costs. `orthoscope calibrate --export TOOL` chooses that formula by held-out error.
 """
 
 
@@ -27,9 +32,20 @@ Example:
     "-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("camera.yaml"), show_default=True, help="File to write."
 )
 def export(calibration: Path, tool: str, out: Path) -> None:
-    """Write a camera for another tool, exactly or not at all."""
+    """Write a camera for another tool."""
     from orthoscope.io.export import export as write
-    from orthoscope.io.own_json import load_camera
+    from orthoscope.io.export import exportable
+    from orthoscope.io.own_json import load, load_camera
+    from orthoscope.methods.calibration import Calibration
+    from orthoscope.models.lenses import lens_name
 
-    write(load_camera(calibration), out, tool)
+    thing = load(calibration)
+    camera = load_camera(calibration)
+    known = exportable(camera, tool, made_from=thing if isinstance(thing, Calibration) else None)
+    write(known.camera, out, tool)
+    if known.camera is not camera:
+        click.echo(
+            f"lens       {lens_name(known.camera.lens)} instead of the free lens: {known.apart_px:.2g} px apart on average "
+            f"{known.where}, {known.farthest_px:.2g} px at most"
+        )
     click.echo(f"wrote      {out}")

@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from orthoscope.evaluation.agreement import MisfitTest
     from orthoscope.evaluation.evaluate import Evaluation
+    from orthoscope.geometry.target import Outlier
     from orthoscope.models.camera import Camera
 
 __all__ = ["camera_numbers", "evaluation_lines", "evaluation_numbers", "to_json"]
@@ -28,6 +32,7 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
     lines = [f"views      {len(detections.views)} used, {len(aside)} set aside; {detections.corners} corners"]
     lines += [f"           {entry.image}: {entry.reason}" for entry in aside[:SHOWN]]
     lines += [f"           and {len(aside) - SHOWN} more, all in detections.json"] if len(aside) > SHOWN else []
+    lines += _outlier_lines(detections.outliers)
     lines.append(
         f"rms        {evaluation.rms_px:.3f} px per point (median {evaluation.median_px:.3f}, largest {evaluation.largest_px:.2f})"
     )
@@ -36,6 +41,7 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
             f"held out   {evaluation.held_out_rms_px:.3f} ± {evaluation.held_out_error_px:.3f} px per point, on views that were not used"
         )
     lines.append(f"NCE        {evaluation.nce:.3f} (1 is what rounding to whole pixels would give)")
+    lines.append(f"misfit     {_misfit_line(evaluation.misfit.target.test, evaluation.misfit.lens.test)}")
     deviations = calibration.uncertainty.deviations
     values = dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.intrinsics.as_tuple(), strict=True))
     lines.append(
@@ -62,10 +68,12 @@ def evaluation_numbers(evaluation: Evaluation) -> dict[str, Any]:
         "held_out_rms_px": evaluation.held_out_rms_px,
         "held_out_error_px": evaluation.held_out_error_px,
         "nce": evaluation.nce,
+        "misfit": {"target": asdict(evaluation.misfit.target.test), "lens": asdict(evaluation.misfit.lens.test)},
         "coverage": evaluation.coverage,
         "corners": detections.corners,
         "views_used": len(detections.views),
         "views_rejected": [{"name": entry.image, "reason": entry.reason} for entry in detections.set_aside],
+        "corners_left_out": [outlier._asdict() for outlier in detections.outliers],
         "views_suspect": [{"name": image, "reason": reason} for image, reason in evaluation.suspects],
         "views": [
             {"name": view.image, "corners": view.corners, "rms_px": view.rms_px, "held_out_rms_px": view.held_out_rms_px}
@@ -95,9 +103,31 @@ def camera_numbers(camera: Camera) -> dict[str, Any]:
     }
 
 
+def _outlier_lines(outliers: tuple[Outlier, ...]) -> list[str]:
+    """How many corners take no part, and in which photographs; nothing where there are none."""
+    if not outliers:
+        return []
+    counts = Counter(outlier.image for outlier in outliers)
+    shown = ", ".join(f"{image} ({count})" for image, count in list(counts.items())[:SHOWN])
+    more = f" and {len(counts) - SHOWN} more" if len(counts) > SHOWN else ""
+    return [f"outliers   {len(outliers)} corner{'s' if len(outliers) > 1 else ''} left out: {shown}{more}"]
+
+
 def to_json(numbers: Any) -> str:
     """One JSON text; NaN and infinity, which JSON has no word for, become null."""
     return json.dumps(_plain(numbers), indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def _misfit_line(target: MisfitTest, lens: MisfitTest) -> str:
+    """What agrees from view to view: of the target's corners, and of the image's places."""
+    if math.isnan(target.f) and math.isnan(lens.f):
+        return "not tested: too few views"
+    parts = (f"{what} {_systematic(test)}" for what, test in (("target", target), ("lens formula", lens)))
+    return f"{', '.join(parts)} (the same in every view; F = 1 is noise)"
+
+
+def _systematic(test: MisfitTest) -> str:
+    return "not tested" if math.isnan(test.f) else f"{test.systematic_px:.3f} px (F {test.f:.1f})"
 
 
 def _plain(thing: Any) -> Any:

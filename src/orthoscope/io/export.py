@@ -1,4 +1,4 @@
-"""A camera as the file of another tool, exactly or not at all: `EXPORTERS` says which tools.
+"""A camera as the file of another tool, a formula exactly or not at all: `EXPORTERS` says which tools.
 
 Floor 5.  The tools named here put pixel (0, 0) where we do, so no number changes; none of them has a skew or a lens frame.  All three
 files are YAML, of a kind so plain that it is written as text.
@@ -16,13 +16,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.evaluation.difference import frame_grid
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.io.files import write_text
+from orthoscope.methods.calibration import Calibration
+from orthoscope.methods.from_pairs import nearest_formula
 from orthoscope.models.camera import Camera
+from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import Brown, Fov, KannalaBrandt, Rational, lens_name
 
-__all__ = ["EXPORTERS", "OPENCV_ORDER", "export", "opencv_coefficients"]
+__all__ = ["EXPORTERS", "OPENCV_ORDER", "Exportable", "export", "exportable", "opencv_coefficients"]
 
 OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
 LENGTHS = (5, 8, 12, 14)
@@ -46,7 +50,35 @@ def export(camera: Camera, path: str | Path, format_name: str) -> None:
         raise InputError(f"{format_name} has no skew, and this camera's is {camera.intrinsics.skew:g} px. Calibrate without skew.")
     if camera.lens_frame is not None:
         raise InputError(f"{format_name} has no distortion centre of its own, and this camera has. Fit a lens about the principal point.")
-    write_text(path, EXPORTERS[format_name](camera))
+    write_text(path, EXPORTERS[format_name].text(camera))
+
+
+class Exportable(NamedTuple):
+    """A camera that a tool can hold, and how far its images are from those of the camera that was asked for: on average, at most, where."""
+
+    camera: Camera
+    apart_px: float
+    farthest_px: float
+    where: str
+
+
+def exportable(camera: Camera, format_name: str, *, made_from: Calibration | None = None) -> Exportable:
+    """The camera itself, or, where its lens is a free one, the nearest formula that the tool has.
+
+    made_from: the calibration of the camera; the nearest is then judged where its corners were seen, otherwise over the frame.
+    Raises InputError for a tool that is not there, CalibrationError where none of its formulas sees so far from the axis.
+    """
+    if format_name not in EXPORTERS:
+        raise InputError(f"no file for {format_name!r} can be written; expected one of {', '.join(EXPORTERS)}.")
+    if not isinstance(camera.lens, FreeLens):
+        return Exportable(camera, 0.0, 0.0, "over the frame")
+    pixels = frame_grid(camera.image_size) if made_from is None else np.concatenate([view.pixels for view in made_from.detections.views])
+    rays = camera.unproject(pixels)
+    rays = rays[np.isfinite(rays).all(1)]
+    other = nearest_formula(camera, rays, EXPORTERS[format_name].lenses)
+    apart = np.hypot(*(other.project(rays) - camera.project(rays)).T)
+    where = "over the frame" if made_from is None else "where corners were seen"
+    return Exportable(other, float(apart.mean()), float(apart.max()), where)
 
 
 def opencv_coefficients(lens: Brown | Rational) -> list[float]:
@@ -117,7 +149,18 @@ def _kalibr(camera: Camera) -> str:
     )
 
 
-EXPORTERS: dict[str, Callable[[Camera], str]] = {"opencv": _opencv, "ros": _ros, "kalibr": _kalibr}
+class Exporter(NamedTuple):
+    """How a tool's file is written, and the lenses that it can hold as they are freed by a calibration for it."""
+
+    text: Callable[[Camera], str]
+    lenses: tuple[str, ...]
+
+
+EXPORTERS: dict[str, Exporter] = {
+    "opencv": Exporter(_opencv, ("brown", "rational", "kannala_brandt")),
+    "ros": Exporter(_ros, ("brown", "rational", "kannala_brandt")),
+    "kalibr": Exporter(_kalibr, ("brown:k1,k2,p1,p2", "kannala_brandt", "fov")),
+}
 
 
 def _numbers(values: ndarray | Iterable[float]) -> str:

@@ -2,7 +2,8 @@
 
 Floor 5.  The core does not know its files and the files not the core's checks: a Struct says which fields and what kind of value, `core`
 makes the thing itself, whose own checks then apply.  A corner is [id, x, y], a matrix a list of rows, a lens its name in
-LENSES and its coefficients by name (one left out has its usual value).  docs/conventions.md says what the numbers mean.
+LENSES and its coefficients by name (one left out has its usual value),
+with the displacement over it where it is a free lens.  docs/conventions.md says what the numbers mean.
 """
 
 from __future__ import annotations
@@ -15,11 +16,14 @@ import numpy as np
 from orthoscope.evaluation.simulate import Scene
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.geometry.target import Detections, SetAside, Target, View
-from orthoscope.methods.calibration import Calibration, Uncertainty
+from orthoscope.geometry.target import Detections, Outlier, SetAside, Target, View
+from orthoscope.methods.calibration import Calibration, Candidate, Uncertainty
 from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import LENSES
+from orthoscope.models.spline import Displacement, Lattice
+from orthoscope.models.target_shape import TargetShape
 
 __all__ = ["CalibrationFile", "CameraFile", "DetectionsFile", "SceneFile"]
 
@@ -64,6 +68,7 @@ class DetectionsFile(_Struct):
     target: TargetFile
     views: list[ViewFile]
     set_aside: list[tuple[str, str]] = []
+    outliers: list[tuple[str, int, tuple[float, float], str]] = []
 
     @classmethod
     def of(cls, detections: Detections) -> DetectionsFile:
@@ -72,11 +77,13 @@ class DetectionsFile(_Struct):
             TargetFile.of(detections.target),
             [ViewFile.of(view) for view in detections.views],
             [(image, reason) for image, reason in detections.set_aside],
+            [(image, corner, pixel, reason) for image, corner, pixel, reason in detections.outliers],
         )
 
     def core(self) -> Detections:
         views = tuple(view.core() for view in self.views)
-        return Detections(self.target.core(), self.image_size, views, tuple(SetAside(*entry) for entry in self.set_aside))
+        aside, outliers = tuple(SetAside(*entry) for entry in self.set_aside), tuple(Outlier(*entry) for entry in self.outliers)
+        return Detections(self.target.core(), self.image_size, views, aside, outliers)
 
 
 class IntrinsicsFile(_Struct, omit_defaults=False):
@@ -90,12 +97,32 @@ class IntrinsicsFile(_Struct, omit_defaults=False):
         return Intrinsics(self.fx, self.fy, self.cx, self.cy, self.skew)
 
 
+class DisplacementFile(_Struct):
+    origin: Row
+    step: Row
+    shape: tuple[int, int]
+    coefficients: list[Row]
+
+    @classmethod
+    def of(cls, over: Displacement) -> DisplacementFile:
+        return cls(over.lattice.origin.tolist(), over.lattice.step.tolist(), over.lattice.shape, over.coefficients.tolist())
+
+    def core(self) -> Displacement:
+        return Displacement(Lattice(_array(self.origin), _array(self.step), self.shape), _array(self.coefficients))
+
+
 class LensFile(_Struct):
+    """A formula of LENSES; with a displacement `over` it, a free lens."""
+
     name: str
     coefficients: dict[str, float]
+    over: DisplacementFile | None = None
 
     @classmethod
     def of(cls, lens: Lens) -> LensFile:
+        if isinstance(lens, FreeLens):
+            base = cls.of(lens.base)
+            return cls(base.name, base.coefficients, DisplacementFile.of(lens.over))
         for name, kind in LENSES.items():
             if type(lens) is kind:
                 return cls(name, dict(zip(lens.names(), lens.coefficients.tolist(), strict=True)))
@@ -104,7 +131,8 @@ class LensFile(_Struct):
     def core(self) -> Lens:
         if self.name not in LENSES:
             raise InputError(f"lens {self.name!r} is not known; expected one of {', '.join(LENSES)}. Upgrade orthoscope or mend the name.")
-        return LENSES[self.name]().with_coefficients(**self.coefficients)
+        formula = LENSES[self.name]().with_coefficients(**self.coefficients)
+        return FreeLens(formula, self.over.core()) if self.over else formula
 
 
 class CameraFile(_Struct):
@@ -149,6 +177,18 @@ class UncertaintyFile(_Struct):
         return Uncertainty(tuple(self.names), _array(self.covariance))
 
 
+class TargetShapeFile(_Struct):
+    kind: str
+    displacements: list[Row]
+
+    @classmethod
+    def of(cls, shape: TargetShape) -> TargetShapeFile:
+        return cls(shape.kind, shape.displacements.tolist())
+
+    def core(self) -> TargetShape:
+        return TargetShape(self.kind, _array(self.displacements).reshape(-1, 3))
+
+
 class CalibrationFile(_Struct, kw_only=True):
     version: str
     camera: CameraFile
@@ -158,7 +198,11 @@ class CalibrationFile(_Struct, kw_only=True):
     method: str
     settings: dict[str, Any]
     assumptions: list[str] = []
+    parameters: float | None = None
+    candidates: list[tuple[str, str, float | None, float | None, float | None]] = []
+    free_camera: CameraFile | None = None
     camera_from_target: list[PoseFile]
+    target_shape: TargetShapeFile | None = None
     detections: DetectionsFile
 
     @classmethod
@@ -174,6 +218,10 @@ class CalibrationFile(_Struct, kw_only=True):
             camera_from_target=[PoseFile.of(pose) for pose in calibration.camera_from_target],
             detections=DetectionsFile.of(calibration.detections),
             assumptions=list(calibration.assumptions),
+            parameters=calibration.parameters,
+            candidates=[_told(candidate) for candidate in calibration.candidates],
+            free_camera=calibration.free_camera and CameraFile.of(calibration.free_camera),
+            target_shape=None if calibration.target_shape.kind == "flat" else TargetShapeFile.of(calibration.target_shape),
         )
 
     def core(self) -> Calibration:
@@ -188,6 +236,10 @@ class CalibrationFile(_Struct, kw_only=True):
             steps=self.steps,
             version=self.version,
             assumptions=tuple(self.assumptions),
+            parameters=float("nan") if self.parameters is None else self.parameters,
+            candidates=tuple(_candidate(row) for row in self.candidates),
+            free_camera=self.free_camera and self.free_camera.core(),
+            **({"target_shape": self.target_shape.core()} if self.target_shape else {}),
         )
 
 
@@ -202,6 +254,16 @@ class SceneFile(_Struct):
 
     def core(self) -> Scene:
         return Scene(self.camera.core(), self.target.core(), tuple(pose.core() for pose in self.camera_from_target))
+
+
+def _told(candidate: Candidate) -> tuple[str, str, float | None, float | None, float | None]:
+    """JSON has no NaN: null says that nothing could judge."""
+    held_out, error, loses = (value if np.isfinite(value) else None for value in candidate[2:])
+    return candidate.target, candidate.lens, held_out, error, loses
+
+
+def _candidate(row: tuple[str, str, float | None, float | None, float | None]) -> Candidate:
+    return Candidate(row[0], row[1], *(float("nan") if value is None else value for value in row[2:]))
 
 
 def _array(rows: Any) -> ndarray:

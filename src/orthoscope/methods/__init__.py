@@ -17,7 +17,7 @@ from orthoscope.methods.fccm import fccm
 from orthoscope.methods.mldc import mldc
 from orthoscope.methods.nmldc import nmldc
 
-__all__ = ["METHODS", "calibrate"]
+__all__ = ["METHODS", "calibrate", "settings_of"]
 
 METHODS: dict[str, Callable[..., Calibration]] = {
     "decoupled": decoupled,
@@ -32,9 +32,17 @@ def calibrate(detections: Detections, *, method: str = "decoupled", **settings: 
 
     Raises CalibrationError where the views cannot tell the camera, InputError for a method or a setting that is none.
     """
-    if method not in METHODS:
-        raise InputError(f"method {method!r} is not known; expected one of {', '.join(METHODS)}.")
-    known = list(inspect.signature(METHODS[method]).parameters)[1:]
+    known = settings_of(method)
     if unknown := sorted(set(settings) - set(known)):
         raise InputError(f"method {method!r} has no setting {unknown[0]!r}; it has {', '.join(known)}.")
     return METHODS[method](detections, **settings)
+
+
+def settings_of(method: str) -> list[str]:
+    """The names of a method's settings.
+
+    Raises InputError for a method that is none.
+    """
+    if method not in METHODS:
+        raise InputError(f"method {method!r} is not known; expected one of {', '.join(METHODS)}.")
+    return list(inspect.signature(METHODS[method]).parameters)[1:]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,8 +43,7 @@ class Uncertainty:
         return {single: float(root) for name, root in zip(self.names, roots, strict=True) for single in name.split("=")}
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """What a method tried: target shape and lens, held-out error with its standard error, pixels per point.
 
     loses_px: its held-out error less that of the one that was taken.  NaN where no view could judge it.

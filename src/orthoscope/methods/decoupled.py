@@ -2,6 +2,7 @@
 
 Floor 3.  The paper corrects detected corners by what perspective alone demands and fits any lens formula to (distorted, corrected) pairs;
 its eq. (7) leaves the camera open, since nothing ties the views together.  What ties them is that one lens and one target made them all:
+0. corners and views that do not belong are named and left out (outliers.py);
 1. poses, the target's shape and a lens that no formula limits, together, their weights found (joint_fit.py, evidence.py);
 2. a lens formula, or the free lens itself, from the pairs of step 1 (from_pairs.py).
 Which target shape, which lens: the simplest that is as good as the best on photographs that were not used (rehearsal.py, choice.py).
@@ -22,10 +23,11 @@ from orthoscope.methods.choice import Contender, judged, richest_unless_worse, s
 from orthoscope.methods.fccm import fccm
 from orthoscope.methods.from_pairs import by_simplicity, formula_from_pairs
 from orthoscope.methods.held_out import FEWEST_VIEWS, folds_of_views
-from orthoscope.methods.joint_fit import FORMULA, FREE, JointFit, fit_jointly
+from orthoscope.methods.joint_fit import FORMULA, JointFit, fit_jointly
+from orthoscope.methods.outliers import without_outliers
 from orthoscope.methods.rehearsal import Rehearsal
 from orthoscope.methods.resection import resect
-from orthoscope.models.lenses import parse_lens
+from orthoscope.models.lenses import FREE, parse_lens
 from orthoscope.models.target_shape import SHAPES, TargetShape
 from orthoscope.version import __version__
 
@@ -57,18 +59,18 @@ def decoupled(
     among: Sequence[str] = (),
     skew: bool = False,
     folds: int = 5,
-    progress: Progress | None = None,
+    rehearsing: Progress | None = None,
 ) -> Calibration:
     """Calibrate with the target's shape estimated and a lens that no formula limits; then, where one is wanted, fit a lens formula.
 
     lens: a name of LENSES (with the coefficients to free, `brown:k1,k2`), `free`, or `auto`: the free lens, or out of the names in `among`
     the simplest that foresees views not used as well as the best.  target: `flat`, `smooth`, `free` or `auto`.  base: the formula under
     the free lens; `auto` takes brown, or kannala_brandt for wide views.  through: the lens of step 1, `free`, `formula` (the base alone)
-    or `auto`.  folds: of the views, to judge by.  progress: called with (fits done, fits to do).
+    or `auto`.  folds: of the views, to judge by.  rehearsing: called with (fits done, fits to do).
     Raises CalibrationError where the views cannot tell the camera, InputError for a setting that is none.
     """
     plan = _plan(lens, target, through, among)
-    flat = fccm(detections, lens=base, skew=skew)
+    flat = fccm(without_outliers(detections, lens=base), lens=base, skew=skew)
     used, base, assumptions = flat.detections, flat.settings["lens"], flat.assumptions
     candidates: tuple[Candidate, ...] = ()
     if len(used.views) < FEWEST_VIEWS:
@@ -76,7 +78,7 @@ def decoupled(
         assumptions = (*assumptions, TOO_FEW)
     elif max(map(len, plan)) > 1:
         rehearsals = [Rehearsal(used, part, base=base, skew=skew) for part in folds_of_views(len(used.views), folds)]
-        plan, candidates = _choose(rehearsals, used, plan, base, progress)
+        plan, candidates = _choose(rehearsals, used, plan, base, rehearsing)
     shape, through, formula = plan.shapes[0], plan.through[0], plan.formulas[0]
     fit = fit_jointly(flat, target=shape, through=through)
     settings = {"lens": formula or (FREE if through == FREE else base), "target": shape, "base": base, "through": through, "skew": skew}

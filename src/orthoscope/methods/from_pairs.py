@@ -5,20 +5,20 @@ Floor 3.  The paper's section 3.2 for any formula: there are no poses in it and 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.joint_fit import JointFit
-from orthoscope.methods.lens_fit import about_principal_point, fit_pairs
+from orthoscope.methods.lens_fit import FOCAL, about_principal_point, converted, fit_pairs
 from orthoscope.methods.reprojection import INTRINSICS
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import parse_lens
 from orthoscope.solve.losses import Huber
 
-__all__ = ["by_simplicity", "formula_from_pairs", "pairs_of"]
+__all__ = ["by_simplicity", "formula_from_pairs", "nearest_formula", "pairs_of"]
 
 
 def by_simplicity(formulas: Iterable[str]) -> tuple[str, ...]:
@@ -48,3 +48,25 @@ def formula_from_pairs(fit: JointFit, lens: str) -> tuple[Camera, tuple[str, ...
     if not np.isfinite(camera.project(rays)).all():
         raise CalibrationError(f"the lens {lens} does not reach all corners. Use one that reaches farther, such as --lens kannala_brandt.")
     return camera, free
+
+
+def nearest_formula(camera: Camera, rays: Float[ndarray, "n 3"], among: Sequence[str]) -> Camera:
+    """The camera with the formula of `among` whose image of the rays is nearest to this camera's, in pixels.
+
+    Raises CalibrationError where none sees all the rays.
+    """
+    wanted = camera.project(rays)
+    near: list[tuple[float, Camera]] = []
+    for text in among:
+        kind, free = parse_lens(text)
+        try:
+            other = converted(camera, kind, rays, free=(*FOCAL, *free))
+        except CalibrationError:
+            continue
+        if np.isfinite(apart := ((other.project(rays) - wanted) ** 2).sum()):
+            near.append((float(apart), other))
+    if not near:
+        raise CalibrationError(
+            f"none of {', '.join(among)} sees as far from the axis as this camera does. Use a tool with a lens of the angle."
+        )
+    return min(near, key=lambda pair: pair[0])[1]

@@ -51,7 +51,7 @@ class HeldOut:
 
     @property
     def _rms_and_error(self) -> tuple[float, float]:
-        return rms_and_error(np.array([(e * e).sum() for e in self.residuals]), np.array([len(e) for e in self.residuals]))
+        return rms_and_error(np.array([(e * e).sum() for e in self.residuals]), np.array([len(e) for e in self.residuals], dtype=float))
 
 
 def rms_and_error(squares: Float[ndarray, " m"], corners: Float[ndarray, " m"]) -> tuple[float, float]:

@@ -18,14 +18,15 @@ from orthoscope.methods.joint_sums import SPACE, Measurements
 from orthoscope.methods.observations import Observations
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.lenses import FREE
 from orthoscope.models.spline import Displacement, Lattice
 from orthoscope.models.target_shape import polynomials
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Huber
 
-__all__ = ["FORMULA", "FREE", "JointFit", "fit_jointly"]
+__all__ = ["FORMULA", "JointFit", "fit_jointly"]
 
-FREE, FORMULA = "free", "formula"  # the lens of step 1: a displacement over a formula, or the formula alone
+FORMULA = "formula"  # beside FREE: the lens of step 1: a displacement over a formula, or the formula alone
 
 ROUNDS = 6
 COARSE, FINE = 1e-3, 1e-9  # tolerances of a round and of the last

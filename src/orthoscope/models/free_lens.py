@@ -89,7 +89,9 @@ class FreeLens(Lens):
             s, _, _ = self.over.at(b_x, b_y)
             b_x, b_y = x_d - s[..., 0], y_d - s[..., 1]
         start = self.base.unwarp(b_x, b_y)
-        beyond = ~np.isfinite(start[0]) & ~self.beyond_image(x_d, y_d)  # the base ends here, this lens perhaps not yet
-        if beyond.any():
-            start[0][beyond], start[1][beyond] = 0.0, 0.0
+        outside = self.beyond_image(x_d, y_d)
+        start[0][outside] = np.nan
+        further = ~np.isfinite(start[0]) & ~outside  # the base ends here, this lens perhaps not yet
+        if further.any():
+            start[0][further], start[1][further] = 0.0, 0.0
         return invert(self.linearise, self.sees, start, (x_d, y_d))

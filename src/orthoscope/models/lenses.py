@@ -7,10 +7,26 @@ from __future__ import annotations
 
 from orthoscope.geometry.arrays import InputError
 from orthoscope.models.decentred_lenses import Brown, Rational
+from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Formula, Lens
 from orthoscope.models.radial_lenses import Division, Fet, Fov, KannalaBrandt, Pfet
 
-__all__ = ["LENSES", "Brown", "Division", "Fet", "Fov", "KannalaBrandt", "Pfet", "Rational", "lens_name", "lens_with_values", "parse_lens"]
+__all__ = [
+    "FREE",
+    "LENSES",
+    "Brown",
+    "Division",
+    "Fet",
+    "Fov",
+    "KannalaBrandt",
+    "Pfet",
+    "Rational",
+    "lens_name",
+    "lens_with_values",
+    "parse_lens",
+]
+
+FREE = "free"  # a formula with a displacement on top: no kind of its own, since it has a base
 
 LENSES: dict[str, type[Formula]] = {
     "brown": Brown,
@@ -54,5 +70,5 @@ def lens_with_values(text: str) -> Formula:
 
 
 def lens_name(lens: Lens) -> str:
-    """The name of a lens in LENSES."""
-    return next(name for name, kind in LENSES.items() if type(lens) is kind)
+    """The name of a lens in LENSES, or `free`."""
+    return FREE if isinstance(lens, FreeLens) else next(name for name, kind in LENSES.items() if type(lens) is kind)

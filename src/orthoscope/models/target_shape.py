@@ -18,6 +18,7 @@ __all__ = ["SHAPES", "TargetShape", "polynomials"]
 
 SHAPES = ("flat", "smooth", "free")
 ORDERS = (1, 2, 3, 4)  # of a smooth surface: a sheet that was stretched, hangs or curls; waves are for single corners
+TOLD = 1e-6  # a polynomial that differs from those before it by less than this share of its size is one of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +57,14 @@ def polynomials(points: Float[ndarray, "m 3"], seen: ndarray, *, orders: Sequenc
     """
     plane = points[:, :2] - points[seen, :2].mean(0)
     x, y = (plane / np.abs(plane[seen]).max()).T
-    order = np.array([i for i in range(max(orders) + 1) for _ in range(i + 1)])
-    powers = np.stack([x ** (i - j) * y**j for i in range(max(orders) + 1) for j in range(i + 1)], axis=1) * seen[:, None]
-    r = np.linalg.qr(powers, mode="r")
-    told = np.abs(np.diag(r)) > 1e-6 * np.sqrt(seen.sum())
-    return (powers @ np.linalg.pinv(r))[:, told & np.isin(order, orders)] * np.sqrt(seen.sum())
+    exponents = [(order - i, i) for order in range(max(orders) + 1) for i in range(order + 1)]
+    found, wanted = np.zeros((len(exponents), len(points))), []
+    for i, j in exponents:
+        before, rest = found[: len(wanted)], x**i * y**j * seen
+        for _ in range(2):  # what rounding leaves the first time goes the second
+            rest = rest - (before @ rest) @ before
+        size = np.sqrt(rest @ rest)
+        if size > TOLD * np.sqrt(seen.sum()):
+            found[len(wanted)] = rest / size
+            wanted.append(i + j in orders)
+    return np.ascontiguousarray(found[: len(wanted)][wanted].T) * np.sqrt(seen.sum())

@@ -1,0 +1,43 @@
+"""What the verbs print about corners that were left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orthoscope.cli.summary import evaluation_lines, evaluation_numbers
+from orthoscope.evaluation.evaluate import Evaluation, evaluate
+from orthoscope.evaluation.simulate import paper_scene, simulate_detections
+from orthoscope.geometry.target import Outlier
+from orthoscope.methods.fccm import fccm
+
+OUTLIERS = tuple(Outlier(f"{i:02d}.jpg", corner, (1.0, 2.0), "9.0 px off") for i in range(8) for corner in range(i + 1))
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> Evaluation:
+    rng = np.random.default_rng(0)
+    return evaluate(fccm(simulate_detections(paper_scene("low", count=6, rng=rng), noise_px=0.1, rng=rng)))
+
+
+def with_outliers(evaluation: Evaluation, outliers: tuple[Outlier, ...]) -> Evaluation:
+    calibration = evaluation.calibration
+    return replace(evaluation, calibration=replace(calibration, detections=replace(calibration.detections, outliers=outliers)))
+
+
+def test_corners_left_out_are_counted_and_their_photographs_named(evaluation: Evaluation):
+    lines = evaluation_lines(with_outliers(evaluation, OUTLIERS))
+    told = "outliers   36 corners left out: 00.jpg (1), 01.jpg (2), 02.jpg (3), 03.jpg (4), 04.jpg (5), 05.jpg (6) and 2 more"
+    assert told in lines
+    assert "outliers   1 corner left out: 00.jpg (1)" in evaluation_lines(with_outliers(evaluation, OUTLIERS[:1]))
+
+
+def test_where_no_corner_is_left_out_nothing_is_said(evaluation: Evaluation):
+    assert not [line for line in evaluation_lines(evaluation) if line.startswith("outliers")]
+
+
+def test_for_machines_every_corner_left_out_has_its_reason(evaluation: Evaluation):
+    (told,) = evaluation_numbers(with_outliers(evaluation, OUTLIERS[:1]))["corners_left_out"]
+    assert told == {"image": "00.jpg", "id": 0, "pixel": (1.0, 2.0), "reason": "9.0 px off"}
