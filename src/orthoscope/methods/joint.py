@@ -166,7 +166,7 @@ class Joint:
     def _with_priors(self, sums: JointSums, unknowns: JointEstimate) -> JointSums:
         k, g = len(self.free), len(self.energy)
         surface, singles, spline = self.precisions
-        zz, z = sums.zz, sums.z
+        zz, z = sums.zz.copy(), sums.z.copy()  # the measurements keep theirs
         if isinstance(unknowns.camera.lens, FreeLens):
             pull = spline * self.energy @ unknowns.camera.lens.over.coefficients
             for i in (0, 1):
@@ -177,6 +177,8 @@ class Joint:
         zz[diagonal, diagonal] += surface.ravel()
         z[diagonal] += (surface * unknowns.surface).ravel()
         return sums._replace(
+            zz=zz,
+            z=z,
             cost=sums.cost + sum(self.penalties(unknowns)),
             cc=sums.cc + np.diag(singles),
             c=sums.c + singles * unknowns.singles,

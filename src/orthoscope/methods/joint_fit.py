@@ -31,6 +31,7 @@ FORMULA = "formula"  # beside FREE: the lens of step 1: a displacement over a fo
 ROUNDS = 6
 COARSE, FINE = 1e-3, 1e-9  # tolerances of a round and of the last
 FAR = 4.0  # standard deviations of a coordinate: independent errors reach so far once in 3000, and count less beyond
+LOSS_KEEPS = 0.05  # share by which noise may change before the loss does: its sums then need not be formed again
 CELLS = 8  # of the displacement's lattice along the image's longer side
 MARGIN = 0.05  # of the image's sides, by which the lattice is larger
 REACH = 0.67  # of the image's half diagonal: the range of the displacement's prior; from half to twice this the held-out error is the same
@@ -55,7 +56,7 @@ class JointFit:
     def with_formula(self, camera: Camera, free: Sequence[str]) -> tuple[Float[ndarray, "k k"], float]:
         """For another camera in the place of the estimate's: covariance of its free parameters, and how many the data determine in all."""
         problem = self.problem
-        measurements = Measurements(problem.measurements.observations, camera, free, problem.measurements.trust)
+        measurements = Measurements(problem.measurements.observations, camera, free)
         other = Joint(
             measurements, problem.points, free,
             surface=problem.surface, energy=np.zeros((0, 0)), single=problem.single, precisions=problem.precisions,
@@ -86,18 +87,21 @@ def fit_jointly(
     points, seen = detections.target.points, observations.present.max(0) > 0
     basis = polynomials(points, seen) if target != "flat" else np.zeros((len(points), 0))
     energy = _energy(camera)
-    measurements = Measurements(observations, camera, free, np.ones(len(observations.order)))
+    measurements = Measurements(observations, camera, free, corners_move=target != "flat")
     estimate = JointEstimate(
         camera, observations.poses_of(flat.camera_from_target), np.zeros((basis.shape[1], SPACE)), np.zeros((len(points), SPACE))
     )
     evidence = first_guess(0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), camera.intrinsics.fx)
+    noise, loss = evidence.noise, Huber(FAR * np.sqrt(evidence.noise))
     steps, settled = 0, False
     for round_ in range(ROUNDS):
         last = settled or round_ == ROUNDS - 1
         precisions = evidence.precisions(basis.shape[1])
         problem = Joint(measurements, points, free, surface=basis, energy=energy, single=target == "free", precisions=precisions)
         options = Options(tolerance=FINE if last else COARSE, max_steps=50)
-        solution = solve(problem, estimate, loss=Huber(FAR * np.sqrt(evidence.noise)), options=options)
+        if abs(evidence.noise / noise - 1.0) > LOSS_KEEPS:
+            noise, loss = evidence.noise, Huber(FAR * np.sqrt(evidence.noise))
+        solution = solve(problem, estimate, loss=loss, options=options)
         estimate, steps = solution.unknowns, steps + solution.steps
         known = problem.known(solution.sums)
         renewed = evidence.renewed(problem, estimate, solution.cost, known)

@@ -52,18 +52,31 @@ def spline_unknowns(camera: Camera) -> int:
 class Measurements:
     """The corners of all views, and what they say at an estimate.
 
-    observations: by corner.  camera: of the kind to come.  free: its parameters that move.  trust: (m,) weight of each view.
+    observations: by corner.  camera: of the kind to come.  free: its parameters that move.  corners_move: whether sums with corners are
+    wanted; they are zero otherwise.
     """
 
-    def __init__(self, observations: Observations, camera: Camera, free: Sequence[str], trust: Float[ndarray, " m"]) -> None:
-        self.observations, self.trust = observations, trust
+    def __init__(self, observations: Observations, camera: Camera, free: Sequence[str], *, corners_move: bool = True) -> None:
+        self.observations, self.corners_move = observations, corners_move
         corners = observations.ids.shape[1]
         self._reprojection = Reprojection(observations, np.zeros((corners, SPACE)), camera, free)
         self._chunks = observations.chunks()
         self._k = len(free)
+        self._last: tuple[tuple[Camera, Poses, Loss], ndarray, JointSums] | None = None
 
     def sums(self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"], loss: Loss) -> JointSums:
-        """The sums at an estimate; points: of the target's corners, metres, target frame."""
+        """The sums at an estimate; points: of the target's corners, metres, target frame.
+
+        Asked for the same again, as when only priors have changed, it gives the same again without work.
+        """
+        asked = (camera, poses, loss)
+        if not (
+            self._last and all(one is other for one, other in zip(asked, self._last[0], strict=True)) and (points == self._last[1]).all()
+        ):
+            self._last = (asked, points, self._sums(camera, poses, points, loss))
+        return self._last[2]
+
+    def _sums(self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"], loss: Loss) -> JointSums:
         m, p = self.observations.ids.shape
         k, g = self._k, spline_unknowns(camera) // 2
         n = k + 2 * g
@@ -73,13 +86,17 @@ class Measurements:
             for chunk in self._chunks:
                 stacked = self._reprojection.stack(Estimate(camera, poses), chunk, places)
                 part, root = self._weigh(stacked, chunk, loss)
-                turned = _by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows])
                 cost += part
                 _add_camera_and_poses(sums, stacked, chunk.rows, k)
-                _add_corners(sums, stacked, turned, chunk.rows, k)
+                turned = _by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows]) if self.corners_move else None
+                if turned is not None:
+                    _add_corners(sums, stacked, turned, chunk.rows, k)
                 if isinstance(camera.lens, FreeLens):
                     design = _design(camera.lens, poses.only(chunk.rows), points) * root[:, :, None]
-                    _add_spline(sums, design, stacked, turned, chunk.rows, k, camera.lens_frame or camera.intrinsics)
+                    frame = camera.lens_frame or camera.intrinsics
+                    _add_spline(sums, design, stacked, chunk.rows, k, frame)
+                    if turned is not None:
+                        _add_spline_and_corners(sums, design, turned, k, frame)
         return sums._replace(cost=cost)
 
     def residuals(self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "m p 2"]:
@@ -93,11 +110,11 @@ class Measurements:
     def _weigh(self, stacked: ndarray, chunk: Chunk, loss: Loss) -> tuple[float, ndarray]:
         """The cost of a chunk, and the root of each corner's weight (views, n), by which its rows are multiplied here."""
         views, n = chunk.u.shape
-        e, trust = stacked[:, -1], self.trust[chunk.rows, None]
-        squared = trust * (e[:, :n] ** 2 + e[:, n:] ** 2)
-        weight = loss.weight(squared)
-        root = np.sqrt(np.broadcast_to(trust if weight is None else trust * weight, (views, n)))
-        if weight is not None or (self.trust != 1.0).any():
+        e = stacked[:, -1]
+        squared = e[:, :n] ** 2 + e[:, n:] ** 2
+        root = np.ones((views, n))
+        if (weight := loss.weight(squared)) is not None and (weight < 1.0).any():
+            root = np.sqrt(weight)
             stacked *= np.concatenate([root, root], axis=1)[:, None]
         return float(loss.cost(squared).sum()), root if chunk.present is None else root * chunk.present
 
@@ -137,8 +154,8 @@ def _design(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> Floa
     return lens.over.lattice.design(*lens.base.warp(*lens.chart.flatten(*in_camera)))
 
 
-def _add_spline(sums: JointSums, design: ndarray, stacked: ndarray, turned: ndarray, rows: slice, k: int, frame: Intrinsics) -> None:
-    """Sums with the displacement's coefficients: those of x move u by fx B, those of y move v by fy B and u by skew B."""
+def _add_spline(sums: JointSums, design: ndarray, stacked: ndarray, rows: slice, k: int, frame: Intrinsics) -> None:
+    """Sums of the displacement's coefficients with themselves, camera and poses: x moves u by fx B; y moves v by fy B and u by skew B."""
     corners, g = design.shape[1:]
     x, y = slice(k, k + g), slice(k + g, k + 2 * g)
     flat = design.reshape(-1, g)
@@ -149,15 +166,17 @@ def _add_spline(sums: JointSums, design: ndarray, stacked: ndarray, turned: ndar
     sums.zz[y, y] += (frame.fy**2 + frame.skew**2) * square
     across = design.transpose(0, 2, 1)
     of_u, of_v = (across @ stacked[:, :, half].transpose(0, 2, 1) for half in (slice(None, corners), slice(corners, None)))
-    down = design.transpose(1, 2, 0)
-    by_u, by_v = (down @ turned[..., half].transpose(1, 0, 2) for half in (0, 1))
-    for columns, products, of_corners in (
-        (x, frame.fx * of_u, frame.fx * by_u),
-        (y, frame.fy * of_v + frame.skew * of_u, frame.fy * by_v + frame.skew * by_u),
-    ):
+    for columns, products in ((x, frame.fx * of_u), (y, frame.fy * of_v + frame.skew * of_u)):
         with_camera = products[:, :, :k].sum(0)
         sums.zz[columns, :k] += with_camera
         sums.zz[:k, columns] += with_camera.T
         sums.z[columns] += products[:, :, -1].sum(0)
         sums.zv[rows, columns] = products[:, :, k:-1]
-        sums.zc[:, columns] += of_corners
+
+
+def _add_spline_and_corners(sums: JointSums, design: ndarray, turned: ndarray, k: int, frame: Intrinsics) -> None:
+    g = design.shape[2]
+    down = design.transpose(1, 2, 0)
+    by_u, by_v = (down @ turned[..., half].transpose(1, 0, 2) for half in (0, 1))
+    sums.zc[:, k : k + g] += frame.fx * by_u
+    sums.zc[:, k + g : k + 2 * g] += frame.fy * by_v + frame.skew * by_u

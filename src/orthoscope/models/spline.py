@@ -12,9 +12,7 @@ smooth where there are data, back to zero where there are none.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,14 +24,6 @@ ACROSS = 4  # splines that are not zero on a cell, in each direction
 # the four pieces of the cubic B-spline on a cell as polynomials in t = 0..1, lowest power first
 WEIGHTS = np.array([[1.0, -3.0, 3.0, -1.0], [4.0, 0.0, -6.0, 3.0], [1.0, 3.0, 3.0, -3.0], [0.0, 0.0, 0.0, 1.0]]).T / 6.0
 NODES = 4  # of Gauss and Legendre: exact for the squares of cubics
-
-
-class Cell(NamedTuple):
-    """Where places lie in one direction: the first of the four splines there, their values (n,4) and slopes (n,4)."""
-
-    first: ndarray
-    values: ndarray
-    slopes: ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,23 +59,22 @@ class Lattice:
 
     def design(self, x: ndarray, y: ndarray) -> ndarray:
         """The value of every spline at places of any shape (...): (..., splines), y-major."""
-        across, down = self._cell(x, 0), self._cell(y, 1)
-        outer = (*x.shape, self.shape[1] + 2 * ACROSS, self.shape[0] + 2 * ACROSS)
-        padded = np.zeros((x.size, outer[-2], outer[-1]))
-        rows, four = np.arange(x.size)[:, None, None], np.arange(ACROSS)
-        padded[rows, down.first.reshape(-1, 1, 1) + four[:, None], across.first.reshape(-1, 1, 1) + four] = down.values.reshape(
-            -1, ACROSS, 1
-        ) * across.values.reshape(-1, 1, ACROSS)
-        return padded[:, ACROSS:-ACROSS, ACROSS:-ACROSS].reshape(*x.shape, self.splines)
+        across, down = self.along(x, 0)[0], self.along(y, 1)[0]
+        return (down[..., :, None] * across[..., None, :]).reshape(*x.shape, self.splines)
 
-    def _cell(self, places: ndarray, axis: int) -> Cell:
-        """first counts splines from ACROSS before the lattice's own, where all coefficients are zero."""
-        t = (np.nan_to_num(places) - self.origin[axis]) / self.step[axis] + ACROSS
-        first = np.clip(np.floor(t), 0, self.shape[axis] + ACROSS)
-        t = np.clip(t - first, 0.0, 1.0)
-        powers = np.stack([np.ones_like(t), t, t * t, t * t * t], axis=-1)
-        slopes = powers[..., :3] @ (WEIGHTS[1:] * np.arange(1.0, 4.0)[:, None]) / self.step[axis]
-        return Cell(first.astype(np.int64), powers @ WEIGHTS, slopes)
+    def along(self, places: ndarray, axis: int) -> tuple[ndarray, ndarray]:
+        """Values and slopes (..., n) of the n splines of one direction, 0 for x and 1 for y, at places of any shape (...).
+
+        With a the distance from a spline's middle in cells: ((2 - a)+^3 - 4 (1 - a)+^3) / 6.  Zero where a place is no number.
+        """
+        t = (places - self.origin[axis]) / self.step[axis] + 1.0
+        offset = np.nan_to_num(t, nan=-ACROSS)[..., None] - np.arange(self.shape[axis])
+        distance = np.abs(offset)
+        outer, inner = np.maximum(2.0 - distance, 0.0), np.maximum(1.0 - distance, 0.0)
+        outer_squared, inner_squared = outer * outer, inner * inner
+        values = (outer_squared * outer - 4.0 * inner_squared * inner) / 6.0
+        slopes = np.sign(offset) * (2.0 * inner_squared - 0.5 * outer_squared) / self.step[axis]
+        return values, slopes
 
     def energy(self, reach: float) -> Float[ndarray, "g g"]:
         """The matrix E of the roughness c'Ec, in the module's words; reach: its range l, in the plane's unit.
@@ -105,26 +94,23 @@ class Displacement:
     """s(x, y): how places of a plane are moved.  coefficients: (splines, 2), of x and of y, in the plane's unit."""
 
     lattice: Lattice
-    coefficients: ndarray = field()
+    coefficients: ndarray
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", frozen(self.coefficients, (self.lattice.splines, 2), "displacement: coefficients"))
 
-    @cached_property
-    def _padded(self) -> ndarray:
-        """(rows, columns, 2) with ACROSS zeros on every side."""
-        columns, rows = self.lattice.shape
-        return np.pad(self.coefficients.reshape(rows, columns, 2), ((ACROSS, ACROSS), (ACROSS, ACROSS), (0, 0)))
-
     def at(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray, ndarray]:
         """s, ds/dx and ds/dy at places of any shape (...), each (..., 2)."""
-        across, down = self.lattice._cell(x, 0), self.lattice._cell(y, 1)
-        four = np.arange(ACROSS)
-        near = self._padded[down.first[..., None, None] + four[:, None], across.first[..., None, None] + four]  # (..., 4 down, 4 across, 2)
-        in_rows = (across.values[..., None, None, :] @ near)[..., 0, :]
-        slopes_in_rows = (across.slopes[..., None, None, :] @ near)[..., 0, :]
-        by_rows, by_slopes = down.values[..., None, :], down.slopes[..., None, :]
-        return (by_rows @ in_rows)[..., 0, :], (by_rows @ slopes_in_rows)[..., 0, :], (by_slopes @ in_rows)[..., 0, :]
+        columns, rows = self.lattice.shape
+        across, across_slopes = self.lattice.along(x, 0)
+        down, down_slopes = self.lattice.along(y, 1)
+        out = np.empty((3, *x.shape, 2))
+        for axis, of_axis in enumerate(self.coefficients.T.reshape(2, rows, columns)):
+            in_columns = down @ of_axis
+            out[0, ..., axis] = np.einsum("...i,...i->...", across, in_columns)
+            out[1, ..., axis] = np.einsum("...i,...i->...", across_slopes, in_columns)
+            out[2, ..., axis] = np.einsum("...i,...i->...", across, down_slopes @ of_axis)
+        return out[0], out[1], out[2]
 
 
 def _grams(splines: int, step: float) -> tuple[ndarray, ndarray, ndarray]:
