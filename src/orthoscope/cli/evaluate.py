@@ -62,7 +62,8 @@ def evaluate(
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         board = target or loaded.detections.target
         detections, _ = detections_from(others, board, image_size=image_size, executor=executor, progress=progress)
-    test = evaluate_on(loaded.camera, detections)
+    shape = None if target else loaded.target_shape  # another board has another shape
+    test = evaluate_on(loaded.camera, detections, shape=shape)
     if as_json:
         rejected = [{"name": entry.image, "reason": entry.reason} for entry in test.detections.set_aside]
         views = [{"name": view.image, "rms_px": rms} for view, rms in zip(test.detections.views, test.view_rms_px, strict=True)]

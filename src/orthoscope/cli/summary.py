@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from orthoscope.evaluation.agreement import MisfitTest
     from orthoscope.evaluation.evaluate import Evaluation
     from orthoscope.geometry.target import Outlier
+    from orthoscope.methods.calibration import Calibration
     from orthoscope.models.camera import Camera
 
 __all__ = ["camera_numbers", "evaluation_lines", "evaluation_numbers", "to_json"]
@@ -53,8 +54,28 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
     if camera.lens_frame:
         centre = {"centre_x": camera.lens_frame.cx, "centre_y": camera.lens_frame.cy}
         lines.append("           about its own centre  " + "  ".join(_number(name, value, deviations) for name, value in centre.items()))
+    lines += _choice_lines(calibration)
     lines += [f"warning    {warning}" for warning in evaluation.warnings]
     return [*lines, f"verdict    {evaluation.verdict}"]
+
+
+def _choice_lines(calibration: Calibration) -> list[str]:
+    """The target's shape, and what the next best of the candidates would lose."""
+    shape, lines = calibration.target_shape, []
+    if shape.kind != "flat":
+        lines.append(
+            f"target     {shape.kind}: corners {1e3 * shape.rms:.2g} mm rms from where they are said to be, "
+            f"{1e3 * shape.height:.2g} mm from the lowest to the highest"
+        )
+    settings = calibration.settings
+    others = [one for one in calibration.candidates if (one.target, one.lens) != (settings["target"], settings["lens"])]
+    if others:
+        other = min(others, key=lambda one: math.inf if math.isnan(one.held_out_px) else one.held_out_px)
+        how = f"loses {other.loses_px:.3f} px" if other.loses_px > 0 else f"would gain {-other.loses_px:.3f} px"
+        lines.append(
+            f"choice     target {settings['target']}, lens {settings['lens']}; next target {other.target}, lens {other.lens} {how} held out"
+        )
+    return lines
 
 
 def evaluation_numbers(evaluation: Evaluation) -> dict[str, Any]:
@@ -82,6 +103,12 @@ def evaluation_numbers(evaluation: Evaluation) -> dict[str, Any]:
         "camera": camera_numbers(calibration.camera),
         "deviations": calibration.uncertainty.deviations,
         "method": calibration.method,
+        "target_shape": {
+            "kind": calibration.target_shape.kind,
+            "rms_mm": 1e3 * calibration.target_shape.rms,
+            "height_mm": 1e3 * calibration.target_shape.height,
+        },
+        "candidates": [one._asdict() for one in calibration.candidates],
         "status": calibration.status,
         "warnings": list(evaluation.warnings),
         "verdict": evaluation.verdict,

@@ -33,7 +33,7 @@ TELLING = 0.25  # of the noise: a misfit that is smaller adds less than a thirti
 NEGLIGIBLE = 0.01  # px: no misfit that is smaller matters to anyone
 CURES = {  # of a target that is not what it is taken to be, by the shape that it was given
     "flat": "Estimate its shape: --method decoupled",
-    "smooth": "A smooth shape does not reach it: let every corner have its own place (target free), or use a flatter target",
+    "smooth": "A smooth shape does not reach it: let every corner have its own place (--shape free), or use a flatter target",
     "free": "Its shape was estimated, and this is left: does it bend between photographs? Fix it to something stiff",
 }
 ALTERNATIVES = ("brown", "rational", "kannala_brandt")  # lenses to try where a formula cannot follow

@@ -20,7 +20,7 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import FREE
 from orthoscope.models.spline import Displacement, Lattice
-from orthoscope.models.target_shape import polynomials
+from orthoscope.models.target_shape import polynomials, without_similarity
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Huber
 
@@ -66,8 +66,9 @@ class JointFit:
 
     @property
     def displacements(self) -> Float[ndarray, "p 3"]:
-        """Of the target's corners, metres."""
-        return self.problem.corners(self.estimate) - self.problem.points
+        """Of the target's corners, metres, without a similarity."""
+        seen = self.problem.measurements.observations.present.max(0) > 0
+        return without_similarity(self.problem.points, self.problem.corners(self.estimate) - self.problem.points, seen)
 
 
 def fit_jointly(

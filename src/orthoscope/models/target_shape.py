@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
+from orthoscope.geometry.pose import nearest_rotation
 
-__all__ = ["SHAPES", "TargetShape", "polynomials"]
+__all__ = ["SHAPES", "TargetShape", "polynomials", "without_similarity"]
 
 SHAPES = ("flat", "smooth", "free")
 ORDERS = (1, 2, 3, 4)  # of a smooth surface: a sheet that was stretched, hangs or curls; waves are for single corners
@@ -48,6 +49,26 @@ class TargetShape:
         """Root mean square of the displacements' lengths, metres, over the corners that have one."""
         squared = (self.displacements**2).sum(1)
         return float(np.sqrt(squared[squared > 0].mean())) if squared.any() else 0.0
+
+    @property
+    def height(self) -> float:
+        """From the lowest corner to the highest, metres."""
+        return float(np.ptp(self.displacements[:, 2]))
+
+
+def without_similarity(points: Float[ndarray, "m 3"], displacements: Float[ndarray, "m 3"], seen: ndarray) -> Float[ndarray, "m 3"]:
+    """The same shape, moved, turned and scaled as a whole to where it is nearest to its nominal points; 0 for corners that were not seen.
+
+    seen: (m,) bool, at least three corners off a line.  S. Umeyama, Least-squares estimation of transformation parameters, TPAMI 13(4), 1991.
+    """
+    nominal, real = points[seen], points[seen] + displacements[seen]
+    centre = real.mean(0)
+    target, source = nominal - nominal.mean(0), real - centre
+    rotation = nearest_rotation(target.T @ source)
+    scale = np.vdot(target, source @ rotation.T) / np.vdot(source, source)
+    settled = np.zeros_like(displacements)
+    settled[seen] = scale * source @ rotation.T - target
+    return settled
 
 
 def polynomials(points: Float[ndarray, "m 3"], seen: ndarray, *, orders: Sequence[int] = ORDERS) -> Float[ndarray, "m r"]:
