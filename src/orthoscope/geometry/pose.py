@@ -14,6 +14,8 @@ from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 
 __all__ = ["Pose", "nearest_rotation", "rotation_from_vector", "vector_from_rotation"]
 
+CROSS = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=float)  # [e_i]_x, flat
+
 
 @dataclass(frozen=True, eq=False)
 class Pose:
@@ -47,14 +49,10 @@ class Pose:
 
 
 def rotation_from_vector(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3 3"]:
-    """Rodrigues: rotation matrices of rotation vectors (radians)."""
+    """Rodrigues: rotation matrices of rotation vectors (radians): I + sin(a)/a [v]_x + (1 - cos a)/a^2 [v]_x^2, a = |v|."""
     angle = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
-    small = angle < 1e-4  # below it the series to third order is exact in double precision
-    safe = np.where(small, 1.0, angle)
-    sine = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
-    versine = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
     cross = cross_matrix(vectors)
-    return np.eye(3) + sine * cross + versine * (cross @ cross)
+    return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * (cross @ cross)
 
 
 def vector_from_rotation(rotation: Float[ndarray, "3 3"]) -> Float[ndarray, "3"]:
@@ -73,9 +71,7 @@ def nearest_rotation(matrices: Float[ndarray, "*batch 3 3"]) -> Float[ndarray, "
 
 def cross_matrix(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3 3"]:
     """[v]_x, so that [v]_x u = v x u."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors.shape[:-1], 3, 3)
+    return (vectors @ CROSS).reshape(*vectors.shape[:-1], 3, 3)
 
 
 def _quaternion(rotation: Float[ndarray, "3 3"]) -> tuple[float, Float[ndarray, "3"]]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import ClassVar, TypeVar
 
 import numpy as np
@@ -277,6 +277,7 @@ class Formula(Lens):
         frozen([getattr(self, name) for name in self.names()], (None,), f"{type(self).__name__}: coefficients")
 
     @classmethod
+    @cache
     def names(cls) -> tuple[str, ...]:  # type: ignore[override]  # a formula's names are its kind's
         return tuple(field.name for field in fields(cls))
 
