@@ -2,12 +2,13 @@
 # make test    the tests
 # make picture the picture in README.md, from the demo
 # make check   all that CI checks: format, lint, types, floors, tests
+# make bench   this project beside its peers; ONLY=solving runs that part (benchmarks/README.md)
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test quick check format lint types floors picture clean
+.PHONY: demo test quick check format lint types floors picture bench bench-peers clean
 
 demo: $(VENV)/installed
 	$(BIN)/orthoscope demo -o demo
@@ -39,6 +40,15 @@ $(VENV)/installed: pyproject.toml
 	$(BIN)/pip install --quiet --upgrade "pip>=25.1"
 	$(BIN)/pip install --quiet --editable . --group dev
 	touch $@
+
+bench: $(VENV)/installed
+	$(BIN)/python -m benchmarks $(ONLY)
+
+bench-peers:
+	$(PYTHON) -m venv benchmarks/.peers/lensboy
+	benchmarks/.peers/lensboy/bin/pip install --quiet lensboy "opencv-contrib-python<5"
+	$(PYTHON) -m venv benchmarks/.peers/discorpy
+	benchmarks/.peers/discorpy/bin/pip install --quiet discorpy
 
 clean:
 	rm -rf $(VENV) demo
