@@ -11,6 +11,7 @@ import sys
 import click
 
 from orthoscope.cli.calibrate import calibrate
+from orthoscope.cli.compare import compare
 from orthoscope.cli.demo import demo
 from orthoscope.cli.detect import detect
 from orthoscope.cli.evaluate import evaluate
@@ -35,7 +36,7 @@ def verbs() -> None:
     """Photographs of a flat target in, a camera that can be trusted out."""
 
 
-for verb in (calibrate, detect, evaluate, undistort, export, report, simulate, demo, paper):
+for verb in (calibrate, detect, evaluate, compare, undistort, export, report, simulate, demo, paper):
     verbs.add_command(verb)
 
 

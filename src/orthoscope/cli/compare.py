@@ -1,0 +1,167 @@
+"""`orthoscope compare`: methods and lenses side by side, on the same photographs.
+
+The floor of the command line.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from orthoscope.cli import options
+
+if TYPE_CHECKING:
+    from orthoscope.evaluation.compare import Comparison, Standing
+
+__all__ = ["compare"]
+
+EXAMPLE = """\b
+Example:
+  $ orthoscope compare photos/ --target chessboard:9x6:25mm --with decoupled --with decoupled:brown --with fccm:brown
+  views      14 used, 0 set aside; 756 corners; 5 folds held out
+                   held out (px)     loses (px)    NCE  used (px)  parameters  seconds  lens   target
+  decoupled        0.088 ± 0.015           best  0.180      0.067         162     3.30  free   free
+  decoupled:brown  0.090 ± 0.013  0.002 ± 0.002  0.189      0.074         141     3.04  brown  free
+  fccm:brown       0.172 ± 0.008  0.085 ± 0.011  0.384      0.164           9     0.01  brown  flat
+  verdict    decoupled foresees these photographs best: 0.088 ± 0.015 px on those that were not used.
+             As good, for all that chance allows to say: decoupled:brown (loses 0.002 ± 0.002 px).
+             The next, fccm:brown, loses 0.085 ± 0.011 px.
+  wrote      comparison/compare.json, comparison/compare.html, comparison/compare.svg
+
+\b
+WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or decoupled:brown:target=flat.
+PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+Exit: 0 done, 1 the photographs are too few to hold any out, 2 the command is wrong.
+"""
+HEADINGS = ("", "held out (px)", "loses (px)", "NCE", "used (px)", "parameters", "seconds", "lens", "target")
+
+
+@click.command(epilog=EXAMPLE)
+@options.photos
+@options.target
+@options.image_size
+@click.option(
+    "--with",
+    "names",
+    multiple=True,
+    metavar="WHO",
+    help="Method and lens to compare, once for each; by default every method, decoupled also with the target's shape free and "
+    "flat, fccm also with rational.",
+)
+@options.folds
+@options.jobs
+@options.cluster
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True, help="Folder to write."
+)
+@options.as_json
+def compare(
+    photos: tuple[str, ...],
+    target: str | None,
+    image_size: tuple[int, int] | None,
+    names: tuple[str, ...],
+    folds: int,
+    jobs: int | None,
+    cluster: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Compare methods and lenses by their error on photographs that they have not seen."""
+    from orthoscope.cli.executors import processes, threads
+    from orthoscope.cli.progress import bar
+    from orthoscope.cli.summary import to_json
+    from orthoscope.evaluation.compare import compare as judge
+    from orthoscope.evaluation.entrants import USUAL, parse_entrant
+    from orthoscope.io.files import check_folder, write_text
+    from orthoscope.io.inputs import detections_from
+    from orthoscope.report.comparison import comparison_page, comparison_svg
+
+    check_folder(out)
+    entrants = [parse_entrant(name) for name in names or USUAL]
+    with threads(jobs, cluster) as executor, bar("detecting") as progress:
+        detections, _ = detections_from(photos, target, image_size=image_size, executor=executor, progress=progress)
+    with processes(jobs or 1, cluster) as executor, bar("comparing") as progress:
+        comparison = judge(detections, entrants, folds=folds, executor=executor, progress=progress)
+    numbers = to_json(_numbers(comparison))
+    texts = {"compare.json": numbers + "\n", "compare.html": comparison_page(comparison), "compare.svg": comparison_svg(comparison)}
+    for name, text in texts.items():
+        write_text(out / name, text)
+    written = "wrote      " + ", ".join(str(out / name) for name in texts)
+    click.echo(numbers if as_json else "\n".join([*_lines(comparison), written]))
+
+
+def _lines(comparison: Comparison) -> list[str]:
+    """The views, the table, who could not be judged and why, what follows."""
+    from orthoscope.evaluation.conclusions import conclusions
+
+    used = comparison.detections
+    left_out = f", {len(used.outliers)} left out" if used.outliers else ""
+    lines = [
+        f"views      {len(used.views)} used, {len(used.set_aside)} set aside; {used.corners} corners{left_out}; "
+        f"{comparison.folds} folds held out",
+        *_table(comparison),
+    ]
+    lines += [f"cannot     {standing.entrant.name}: {standing.failure}" for standing in comparison.standings if standing.failure]
+    first, *others = conclusions(comparison)
+    return [*lines, f"verdict    {first}", *(f"           {sentence}" for sentence in others)]
+
+
+def _table(comparison: Comparison) -> list[str]:
+    """The table as aligned lines, names and words to the left, numbers to the right."""
+    from orthoscope.report.comparison import rows
+
+    cells: list[tuple[str, ...]] = [HEADINGS]
+    for row in rows(comparison):
+        loses = row.verdict if row.verdict == "best" else row.loses
+        cells.append((row.name, row.held_out, loses, row.nce, row.used, row.parameters, row.seconds, row.lens, row.shape))
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    words = (0, 7, 8)
+    return [
+        "  ".join(
+            cell.ljust(width) if i in words else cell.rjust(width) for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in cells
+    ]
+
+
+def _numbers(comparison: Comparison) -> dict[str, Any]:
+    """All of it as one object for machines; what is not known is None."""
+    from orthoscope.evaluation.conclusions import conclusions
+    from orthoscope.version import __version__
+
+    used = comparison.detections
+    return {
+        "version": __version__,
+        "target": used.target.name,
+        "image_size": list(used.image_size),
+        "corners": used.corners,
+        "folds": comparison.folds,
+        "views": [{"name": view.image, "corners": len(view.ids)} for view in used.views],
+        "views_rejected": [{"name": entry.image, "reason": entry.reason} for entry in used.set_aside],
+        "corners_left_out": [outlier._asdict() for outlier in used.outliers],
+        "compared": [_standing(standing, comparison) for standing in comparison.standings],
+        "conclusions": list(conclusions(comparison)),
+    }
+
+
+def _standing(standing: Standing, comparison: Comparison) -> dict[str, Any]:
+    corners = [len(view.ids) for view in comparison.detections.views]
+    return {
+        "name": standing.entrant.name,
+        "method": standing.entrant.method,
+        "settings": dict(standing.entrant.settings),
+        "held_out_rms_px": standing.held_out_px,
+        "held_out_error_px": standing.error_px,
+        "loses_px": standing.loses_px,
+        "loses_error_px": standing.loses_error_px,
+        "nce": standing.nce,
+        "rms_px": standing.rms_px,
+        "parameters": standing.parameters,
+        "seconds": standing.seconds,
+        "lens": standing.lens or None,
+        "target": standing.shape or None,
+        "failure": standing.failure or None,
+        "views_held_out_rms_px": [float((total / n) ** 0.5) for total, n in zip(standing.squares, corners, strict=True)],
+    }
