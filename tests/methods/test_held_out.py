@@ -130,7 +130,7 @@ def drawn(views: int, seed: int) -> HeldOut:
     """Residuals of views that differ in size and in their corners' number."""
     rng = np.random.default_rng(seed)
     residuals = tuple(rng.gamma(4.0, 0.1) * rng.normal(size=(int(rng.integers(20, 60)), 2)) for _ in range(views))
-    return HeldOut((None,) * views, (None,) * views, residuals)
+    return HeldOut((None,) * views, (None,) * views, (None,) * views, residuals)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -151,7 +151,7 @@ def test_the_standard_error_is_the_scatter_of_the_error_over_repeated_sets_of_vi
 
 
 def test_the_standard_error_of_two_views_is_half_their_difference():
-    unseen = HeldOut((None,) * 2, (None,) * 2, (np.array([[3.0, 0.0], [0.0, 3.0]]), np.array([[1.0, 0.0], [0.0, -1.0]])))
+    unseen = HeldOut((None,) * 2, (None,) * 2, (None,) * 2, (np.array([[3.0, 0.0], [0.0, 3.0]]), np.array([[1.0, 0.0], [0.0, -1.0]])))
     assert unseen.rms_px == pytest.approx(np.sqrt(5.0))  # of the views' mean squares, 9 and 1
     assert unseen.standard_error_px == pytest.approx(4.0 / (2.0 * np.sqrt(5.0)))  # 4 is that of their mean; a root halves it
 
@@ -164,4 +164,4 @@ def test_without_noise_the_error_is_zero_and_certain():
 
 def test_a_corner_without_residual_has_no_say():
     e = np.array([[3.0, 4.0], [np.nan, np.nan]])
-    assert HeldOut((None,), (None,), (e,)).rms_px == 5.0
+    assert HeldOut((None,), (None,), (None,), (e,)).rms_px == 5.0

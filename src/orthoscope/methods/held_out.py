@@ -51,7 +51,9 @@ class HeldOut:
 
     @property
     def _rms_and_error(self) -> tuple[float, float]:
-        return rms_and_error(np.array([(e * e).sum() for e in self.residuals]), np.array([len(e) for e in self.residuals], dtype=float))
+        found = [e[np.isfinite(e).all(1)] for e in self.residuals]
+        squares = np.array([(e * e).sum() if len(e) else np.nan for e in found])
+        return rms_and_error(squares, np.array([len(e) for e in found], dtype=float))
 
 
 def rms_and_error(squares: Float[ndarray, " m"], corners: Float[ndarray, " m"]) -> tuple[float, float]:
