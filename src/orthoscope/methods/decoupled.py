@@ -28,7 +28,7 @@ from orthoscope.methods.outliers import without_outliers
 from orthoscope.methods.rehearsal import Rehearsal
 from orthoscope.methods.resection import resect
 from orthoscope.models.lenses import FREE, parse_lens
-from orthoscope.models.target_shape import SHAPES, TargetShape
+from orthoscope.models.target_shape import SHAPES
 from orthoscope.version import __version__
 
 __all__ = ["decoupled"]
@@ -146,7 +146,7 @@ def _calibration(
     else:
         camera, names = formula_from_pairs(fit, settings["lens"])
         covariance, parameters = fit.with_formula(camera, names)
-    shape = TargetShape(settings["target"], fit.displacements)
+    shape = fit.shape
     return Calibration(
         camera=camera,
         camera_from_target=resect(camera, used, shape=shape),

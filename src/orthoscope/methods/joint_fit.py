@@ -20,7 +20,7 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import FREE
 from orthoscope.models.spline import Displacement, Lattice
-from orthoscope.models.target_shape import polynomials, without_similarity
+from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Huber
 
@@ -39,8 +39,12 @@ REACH = 0.67  # of the image's half diagonal: the range of the displacement's pr
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """What came out: the problem with its last weights, the estimate, covariance (k,k) of the free parameters, steps and status."""
+    """What came out: the kind of the target's shape, the problem with its last weights, the estimate and what it speaks for.
 
+    covariance: (k,k) of the free parameters.  steps, status: of the solver.
+    """
+
+    target: str
     problem: Joint
     estimate: JointEstimate
     evidence: Evidence
@@ -65,10 +69,13 @@ class JointFit:
         return self.evidence.noise * known.camera, len(free) + float(known.surface.sum() + known.singles.sum())
 
     @property
-    def displacements(self) -> Float[ndarray, "p 3"]:
-        """Of the target's corners, metres, without a similarity."""
+    def shape(self) -> TargetShape:
+        """Of the target, without a similarity."""
+        points = self.problem.points
+        if self.target == "flat":
+            return TargetShape.flat(len(points))
         seen = self.problem.measurements.observations.present.max(0) > 0
-        return without_similarity(self.problem.points, self.problem.corners(self.estimate) - self.problem.points, seen)
+        return TargetShape(self.target, without_similarity(points, self.problem.corners(self.estimate) - points, seen))
 
 
 def fit_jointly(
@@ -107,7 +114,7 @@ def fit_jointly(
         known = problem.known(solution.sums)
         renewed = evidence.renewed(problem, estimate, solution.cost, known)
         if last:
-            return JointFit(problem, estimate, renewed, renewed.noise * known.camera, steps, solution.status.value)
+            return JointFit(target, problem, estimate, renewed, renewed.noise * known.camera, steps, solution.status.value)
         settled = renewed.agrees_with(evidence)
         evidence = renewed
     raise AssertionError("the last round returns")

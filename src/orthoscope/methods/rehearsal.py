@@ -16,7 +16,6 @@ from orthoscope.methods.fccm import fccm
 from orthoscope.methods.from_pairs import formula_from_pairs
 from orthoscope.methods.joint_fit import JointFit, fit_jointly
 from orthoscope.methods.resection import resect
-from orthoscope.models.target_shape import TargetShape
 
 __all__ = ["Rehearsal"]
 
@@ -45,8 +44,7 @@ class Rehearsal:
         try:
             fit = self.step_one(shape, through)
             camera = formula_from_pairs(fit, lens)[0] if lens else fit.estimate.camera
-            found = TargetShape(shape, fit.displacements)
-            poses = resect(camera, self._tested, shape=found)
+            poses = resect(camera, self._tested, shape=fit.shape)
         except CalibrationError:
             return np.full(len(self.part), np.nan)
-        return np.array([(e * e).sum() for e in residuals_of(camera, poses, self._tested, shape=found)])
+        return np.array([(e * e).sum() for e in residuals_of(camera, poses, self._tested, shape=fit.shape)])
