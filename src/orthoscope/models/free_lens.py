@@ -27,7 +27,7 @@ BACK = 3  # rounds of b <- (x_d, y_d) - s(b): a start for the inverse that is go
 
 @dataclass(frozen=True, eq=False)
 class FreeLens(Lens):
-    """`base` with the displacement `over` on its distorted plane; its named coefficients are the base's.
+    """A formula, `base`, and a displacement of its distorted plane by bicubic splines, `over`; named coefficients are the formula's.
 
     Raises InputError where the base is a free lens itself.
     """

@@ -59,7 +59,7 @@ class TargetShape:
 def without_similarity(points: Float[ndarray, "m 3"], displacements: Float[ndarray, "m 3"], seen: ndarray) -> Float[ndarray, "m 3"]:
     """The same shape, moved, turned and scaled as a whole to where it is nearest to its nominal points; 0 for corners that were not seen.
 
-    seen: (m,) bool, at least three corners off a line.  S. Umeyama, Least-squares estimation of transformation parameters, TPAMI 13(4), 1991.
+    seen: (m,) bool, at least three corners off a line.  S. Umeyama, Least-squares estimation of transformations, TPAMI 13(4), 1991.
     """
     nominal, real = points[seen], points[seen] + displacements[seen]
     centre = real.mean(0)
