@@ -22,7 +22,7 @@ from orthoscope.methods.observations import Chunk, Observations, Poses
 from orthoscope.methods.reprojection import POSE, Estimate, Places, Reprojection
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.free_lens import FreeLens
-from orthoscope.solve.losses import Loss
+from orthoscope.solve.losses import Linear, Loss
 
 __all__ = ["JointSums", "Measurements", "spline_unknowns"]
 
@@ -30,7 +30,10 @@ SPACE = 3
 
 
 class JointSums(NamedTuple):
-    """The module's sums: cost, zz (n,n), z (n,), zv (m,n,6), vv (m,6,6), v (m,6), zc (p,n,3), cc (p,3,3), c (p,3), vc (m,p,6,3)."""
+    """The module's sums: cost, zz (n,n), z (n,), zv (m,n,6), vv (m,6,6), v (m,6), zc (p,n,3), cc (p,3,3), c (p,3), vc (m,p,6,3).
+
+    residuals: (m,p,2) predicted minus detected, pixels, not weighted; 0 where a corner was not seen.
+    """
 
     cost: float
     zz: ndarray
@@ -42,6 +45,7 @@ class JointSums(NamedTuple):
     cc: ndarray
     c: ndarray
     vc: ndarray
+    residuals: ndarray
 
 
 def spline_unknowns(camera: Camera) -> int:
@@ -85,6 +89,7 @@ class Measurements:
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             for chunk in self._chunks:
                 stacked = self._reprojection.stack(Estimate(camera, poses), chunk, places)
+                sums.residuals[chunk.rows] = _residuals(stacked)
                 part, root = self._weigh(stacked, chunk, loss)
                 cost += part
                 _add_camera_and_poses(sums, stacked, chunk.rows, k)
@@ -101,11 +106,7 @@ class Measurements:
 
     def residuals(self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "m p 2"]:
         """Projected minus detected, pixels; 0 where a corner was not seen."""
-        out = np.zeros((*self.observations.ids.shape, 2))
-        for chunk in self._chunks:
-            row = self._reprojection.stack(Estimate(camera, poses), chunk, Places(*points.T))[:, -1]
-            out[chunk.rows] = row.reshape(len(row), 2, -1).transpose(0, 2, 1)
-        return out
+        return self.sums(camera, poses, points, self._last[0][2] if self._last else Linear()).residuals
 
     def _weigh(self, stacked: ndarray, chunk: Chunk, loss: Loss) -> tuple[float, ndarray]:
         """The cost of a chunk, and the root of each corner's weight (views, n), by which its rows are multiplied here."""
@@ -120,8 +121,23 @@ class Measurements:
 
 
 def _zeros(n: int, m: int, p: int) -> JointSums:
-    shapes = [(n, n), (n,), (m, n, POSE), (m, POSE, POSE), (m, POSE), (p, n, SPACE), (p, SPACE, SPACE), (p, SPACE), (m, p, POSE, SPACE)]
+    shapes = [
+        (n, n),
+        (n,),
+        (m, n, POSE),
+        (m, POSE, POSE),
+        (m, POSE),
+        (p, n, SPACE),
+        (p, SPACE, SPACE),
+        (p, SPACE),
+        (m, p, POSE, SPACE),
+        (m, p, 2),
+    ]
     return JointSums(0.0, *(np.zeros(shape) for shape in shapes))
+
+
+def _residuals(stacked: Float[ndarray, "v columns n2"]) -> Float[ndarray, "v n 2"]:
+    return stacked[:, -1].reshape(len(stacked), 2, -1).transpose(0, 2, 1)
 
 
 def _by_corner(by_translation: Float[ndarray, "v 3 n2"], rotation: Float[ndarray, "v 3 3"]) -> Float[ndarray, "v n 3 2"]:
