@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 from orthoscope.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from orthoscope.evaluation.compare import Comparison as Comparison
+    from orthoscope.evaluation.compare import compare as compare
     from orthoscope.evaluation.difference import image_difference as image_difference
     from orthoscope.evaluation.evaluate import Evaluation as Evaluation
     from orthoscope.evaluation.evaluate import evaluate as evaluate
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from orthoscope.geometry.target import chessboard as chessboard
     from orthoscope.geometry.target import parse_target as parse_target
     from orthoscope.io.detect import detect as detect
+    from orthoscope.io.export import export as export
     from orthoscope.io.images import read_image as read_image
     from orthoscope.io.images import write_image as write_image
     from orthoscope.io.own_json import load as load
@@ -42,13 +45,16 @@ if TYPE_CHECKING:
     from orthoscope.methods import METHODS as METHODS
     from orthoscope.methods import calibrate as calibrate
     from orthoscope.methods.calibration import Calibration as Calibration
+    from orthoscope.methods.held_out import held_out as held_out
     from orthoscope.methods.resection import resect as resect
     from orthoscope.models.camera import Camera as Camera
     from orthoscope.models.camera import Intrinsics as Intrinsics
     from orthoscope.models.lenses import LENSES as LENSES
+    from orthoscope.models.target_shape import TargetShape as TargetShape
     from orthoscope.report.page import write_report as write_report
 
 ROOMS = {
+    "evaluation.compare": ("Comparison", "compare"),
     "evaluation.difference": ("image_difference",),
     "evaluation.evaluate": ("Evaluation", "evaluate"),
     "evaluation.metrics": ("normalised_calibration_error",),
@@ -58,14 +64,17 @@ ROOMS = {
     "geometry.pose": ("Pose",),
     "geometry.target": ("Detections", "Target", "View", "chessboard", "parse_target"),
     "io.detect": ("detect",),
+    "io.export": ("export",),
     "io.images": ("read_image", "write_image"),
     "io.own_json": ("load", "load_camera", "save"),
     "io.undistort": ("undistort",),
     "methods": ("METHODS", "calibrate"),
     "methods.calibration": ("Calibration",),
+    "methods.held_out": ("held_out",),
     "methods.resection": ("resect",),
     "models.camera": ("Camera", "Intrinsics"),
     "models.lenses": ("LENSES",),
+    "models.target_shape": ("TargetShape",),
     "report.page": ("write_report",),
 }
 _ROOM_OF = {name: room for room, names in ROOMS.items() for name in names}
