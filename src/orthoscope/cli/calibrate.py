@@ -93,7 +93,8 @@ def calibrate_into(
     from orthoscope.methods import settings_of
 
     check_folder(out)
-    among = _lenses_of(export) if "among" in settings_of(method) else ()
+    lenses = _lenses_of(export)
+    among = lenses if "among" in settings_of(method) else ()
     given = {"lens": lens, "skew": skew, "target": shape, "loss": loss, "among": among or None}
     given = {name: value for name, value in given.items() if value is not None}
     with threads(jobs, cluster) as executor, bar("detecting") as progress:

@@ -15,9 +15,12 @@ __all__ = ["bar"]
 @contextmanager
 def bar(title: str) -> Iterator[Callable[..., None]]:
     """A callable (done, total, name...) that draws a bar; silent where stderr is no terminal."""
+    if not sys.stderr.isatty():
+        yield lambda done, total, *name: None
+        return
     from tqdm import tqdm
 
-    with tqdm(desc=title, file=sys.stderr, leave=False, disable=None) as drawn:
+    with tqdm(desc=title, file=sys.stderr, leave=False) as drawn:
 
         def show(done: int, total: int, *name: str) -> None:
             drawn.total = total

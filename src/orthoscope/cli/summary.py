@@ -68,7 +68,7 @@ def _choice_lines(calibration: Calibration) -> list[str]:
             f"{1e3 * shape.height:.2g} mm from the lowest to the highest"
         )
     settings = calibration.settings
-    others = [one for one in calibration.candidates if (one.target, one.lens) != (settings["target"], settings["lens"])]
+    others = [one for one in calibration.candidates if one.loses_px != 0.0]
     if others:
         other = min(others, key=lambda one: math.inf if math.isnan(one.held_out_px) else one.held_out_px)
         how = f"loses {other.loses_px:.3f} px" if other.loses_px > 0 else f"would gain {-other.loses_px:.3f} px"

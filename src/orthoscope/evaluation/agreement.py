@@ -1,7 +1,7 @@
 """Do residuals agree from view to view, beyond chance?  The F test and the vote of the views that misfit.py derives.
 
-Floor 4.  Matrices are inverted with their columns scaled to length 1 and FAINT added to the diagonal: a direction that is as faint as that
-once other columns are granted counts as none, and the rank is the trace of G (G + FAINT)^-1.
+Floor 4.  What columns explain, and how many they are, says whitening.py, of all columns together and of the granted ones alone; the tested
+ones have the difference.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import numpy as np
 
 from orthoscope.evaluation.columns import Columns
 from orthoscope.evaluation.f_distribution import f_survival
+from orthoscope.evaluation.whitening import FAINT, Whitening
 from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["Agreement", "MisfitTest", "agreement"]
 
-FAINT = 1e-8  # squared share of a column: what is left of it after elimination is rounding when it is no more
 FEWEST_VIEWS = 3  # with fewer, "the same in all views" means nothing
 FEWEST_WITHIN = 10  # degrees of freedom left for the noise
 ALL_SIGNS = 11  # views up to which every combination of signs is tried; with more, as many at random
@@ -49,24 +49,29 @@ class Agreement(NamedTuple):
     unknowns: ndarray
 
 
-def agreement(columns: Columns, tested: int, granted: list[int]) -> Agreement:
-    """Test one block of columns with other blocks, and the poses, granted; NaN, and unknowns 0, where the views do not suffice."""
-    B, A = columns.places[tested], np.concatenate([columns.places[i] for i in granted])
-    inverse, rank_A = _inverse(columns.gram[np.ix_(A, A)], np.diag(columns.gram)[A])
-    onto_A = inverse @ columns.gram[np.ix_(A, B)]
-    left = columns.without(granted, inverse @ columns.scores(columns.residual)[:, A].sum(0))
-    scores = columns.scores(left)
-    of_B = scores[:, B] - scores[:, A] @ onto_A
-    gram_B = columns.gram[np.ix_(B, B)] - columns.gram[np.ix_(B, A)] @ onto_A
-    inverse_B, rank_B = _inverse(gram_B, np.diag(columns.gram)[B])
+def agreement(columns: Columns, whole: Whitening, tested: int) -> Agreement:
+    """Test one block of columns with the other blocks, and the poses, granted; NaN, and unknowns 0, where the views do not suffice.
+
+    whole: of all the columns' gram matrix.
+    """
+    granted = [i for i in range(len(columns.blocks)) if i != tested]
+    A, B = np.concatenate([columns.places[i] for i in granted]), columns.places[tested]
+    white_A = whole.white_of(A)
+    left = columns.without(granted, white_A.T @ (white_A @ (columns.score[A] / whole.lengths[A])) / whole.lengths[A])
+    scores = columns.scores(left) / whole.lengths
+    of_all, of_A = scores @ whole.white.T, scores[:, A] @ white_A.T
+    rank_A, rank_B = _rank(white_A), _rank(whole.white[:, B])
     within = 2 * len(left) - columns.poses_rank - rank_A - rank_B
     if columns.views < FEWEST_VIEWS or within < FEWEST_WITHIN or rank_B < 1:
         return Agreement(MisfitTest(*[float("nan")] * 8), np.zeros(len(B)))
-    of_views = _Squares(
-        by_B=of_B @ inverse_B @ of_B.T, by_A=scores[:, A] @ inverse @ scores[:, A].T, energy=float((left * left).sum()), corners=len(left)
-    )
-    test = _voted(of_views, rank_B, within)
-    return Agreement(test, _shrunk(gram_B, of_B.sum(0), test, len(left)))
+    by_A = of_A @ of_A.T
+    test = _voted(_Squares(by_B=of_all @ of_all.T - by_A, by_A=by_A, energy=float((left * left).sum()), corners=len(left)), rank_B, within)
+    if not test.systematic_px > 0.0:
+        return Agreement(test, np.zeros(len(B)))
+    by_granted = white_A @ whole.gram[np.ix_(A, B)]
+    gram_B, score_B = whole.gram[np.ix_(B, B)], scores[:, B].sum(0) - by_granted.T @ of_A.sum(0)
+    gram_B -= by_granted.T @ by_granted
+    return Agreement(test, _shrunk(gram_B, score_B, whole.lengths[B], test, len(left)))
 
 
 class _Squares(NamedTuple):
@@ -99,19 +104,23 @@ def _voted(squares: _Squares, between: float, within: float) -> MisfitTest:
     )
 
 
-def _shrunk(gram: Float[ndarray, "c c"], score: Float[ndarray, " c"], test: MisfitTest, corners: int) -> Float[ndarray, " c"]:
-    """The unknowns as normal numbers would be expected whose spread makes the systematic part, seen through the noise."""
-    if not test.systematic_px > 0.0:
-        return np.zeros(len(score))
-    spread = test.systematic_px**2 * corners / np.trace(gram)
-    return np.linalg.solve(gram + 0.5 * max(test.chance, 1.0) * test.noise_px**2 / spread * np.eye(len(gram)), score)
+def _shrunk(
+    gram: Float[ndarray, "c c"], score: Float[ndarray, " c"], lengths: Float[ndarray, " c"], test: MisfitTest, corners: int
+) -> Float[ndarray, " c"]:
+    """The unknowns as normal numbers would be expected whose spread makes the systematic part, seen through the noise.
+
+    gram (overwritten), score: of the columns, the granted ones eliminated, scaled to length 1 with FAINT added; lengths: before that.
+    """
+    squares = lengths * lengths
+    spread = test.systematic_px**2 * corners / (squares @ (gram.diagonal() - FAINT))
+    noise = 0.5 * max(test.chance, 1.0) * test.noise_px**2 / spread
+    np.fill_diagonal(gram, gram.diagonal() - FAINT + noise / squares)
+    return np.linalg.solve(gram, score) / lengths
 
 
-def _inverse(gram: Float[ndarray, "c c"], whole: Float[ndarray, " c"]) -> tuple[Float[ndarray, "c c"], float]:
-    """The inverse of an eliminated gram matrix, and its rank.  whole: its diagonal before elimination, the columns' squared lengths."""
-    scale = np.sqrt(np.where(whole > 0.0, whole, 1.0))
-    inverse = np.linalg.inv(gram / np.outer(scale, scale) + FAINT * np.eye(len(gram)))
-    return inverse / np.outer(scale, scale), float(len(gram) - FAINT * np.trace(inverse))
+def _rank(white: Float[ndarray, "_ c"]) -> float:
+    """The rank of the columns (c) that a whitening, or these columns of it, is of."""
+    return white.shape[1] - FAINT * float(np.einsum("ij,ij", white, white))
 
 
 def _signs(views: int) -> Float[ndarray, "s v"]:

@@ -46,6 +46,7 @@ from orthoscope.evaluation.cells import Cells, cells_for
 from orthoscope.evaluation.columns import Block, Columns
 from orthoscope.evaluation.difference import image_difference
 from orthoscope.evaluation.slopes import Slopes, parameters_of, slopes_of, stepped
+from orthoscope.evaluation.whitening import Whitening
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.methods.calibration import Calibration
 
@@ -102,8 +103,9 @@ def misfit(calibration: Calibration) -> Misfit:
     camera = Block(weight * slopes.by_camera, np.zeros_like(slopes.view), 1)
     image = Block(weight * np.eye(2), cells.of(slopes.pixels), cells.columns * cells.rows)
     target = Block(weight * slopes.by_place, patches[slopes.corner], int(patches.max(initial=-1)) + 1)
-    columns = Columns(weight[:, 0] * slopes.residual, weight * slopes.by_pose, slopes.view, len(detections.views), (camera, image, target))
-    of_target, of_lens = agreement(columns, 2, [0, 1]), agreement(columns, 1, [0, 2])
+    columns = Columns(weight[:, 0] * slopes.residual, weight * slopes.by_pose, slopes.view, len(detections.views), (target, camera, image))
+    whole = Whitening.of(columns.gram)  # the target, which is large, stands first: what is granted to the lens is then a block of it
+    of_target, of_lens = agreement(columns, whole, 0), agreement(columns, whole, 2)
     return Misfit(
         TargetMisfit(of_target.test, _displacements(of_target, slopes, patches), _scale(slopes), _moved(calibration, columns, of_target)),
         LensMisfit(of_lens.test, cells, _cell_residuals(of_lens, image, cells)),
@@ -137,7 +139,7 @@ def _moved(calibration: Calibration, columns: Columns, of_target: Agreement) -> 
     """How far the image moves (rms px at the detected corners) from this camera to the one that the displaced corners ask for."""
     if not of_target.unknowns.any():
         return 0.0
-    S, T = columns.places[0], columns.places[2]
+    T, S, _ = columns.places
     change = np.linalg.lstsq(columns.gram[np.ix_(S, S)], columns.gram[np.ix_(S, T)] @ of_target.unknowns, rcond=None)[0]
     camera = calibration.camera
     for name, step in zip(parameters_of(calibration), change, strict=True):

@@ -1,6 +1,6 @@
 """Whatever holds corners, to Detections: photographs, our own detections.json, or a corners.vnl table.
 
-Floor 5.
+Floor 5.  OpenCV is loaded for photographs only.
 """
 
 from __future__ import annotations
@@ -11,8 +11,6 @@ from pathlib import Path
 
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.target import Detections, Target, parse_target
-from orthoscope.io.detect import detect
-from orthoscope.io.images import names_of, photographs
 from orthoscope.io.own_json import load_detections
 from orthoscope.io.vnl import read_vnl
 
@@ -43,5 +41,8 @@ def detections_from(
         if image_size is None:
             raise InputError(f"{paths[0]} does not say how large the photographs are; add their size, such as --image-size 640x480.")
         return read_vnl(paths[0], target, image_size), {}
+    from orthoscope.io.detect import detect
+    from orthoscope.io.images import names_of, photographs
+
     files = photographs(paths)
     return detect(files, target, jobs=jobs, executor=executor, progress=progress), dict(zip(names_of(files), files, strict=True))

@@ -14,7 +14,8 @@ positive.  Pixels as ours: (0, 0) is the centre of the first.  mrcal: doc/how-to
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import compress, count, pairwise
+from operator import ne
 from pathlib import Path
 from typing import NamedTuple
 
@@ -49,7 +50,7 @@ def read_vnl(path: str | Path, target: Target, image_size: tuple[int, int]) -> D
     and where a corner lies outside the image.
     """
     table = _table(read_text(path), path)
-    starts = [i for i, (before, image) in enumerate(pairwise(["", *table.images])) if image != before]
+    starts = [0, *compress(count(1), map(ne, table.images, table.images[1:]))]
     _check_once(table, starts, path)
     _check_inside(table, image_size, path)
     found = np.isfinite(table.pixels[:, 0])
@@ -111,7 +112,7 @@ def _legend(text: str) -> list[str]:
 
 def _columns(table: _Table, most: int, path: str | Path) -> list[list[str]]:
     """The words of each column; a row may lack those after y, which then are 1."""
-    rows = [line for line in map(str.strip, table.text.split("\n")) if _is_row(line)]
+    rows = [line for line in map(str.strip, table.text.split("\n")) if line and line[0] != "#"]  # _is_row, many times
     if not rows:
         raise InputError(f"{path} has no corners; expected lines such as 'frame1.jpg 1385.433 1471.719 0'. Find corners first.")
     width, words = len(rows[0].split()), " ".join(rows).split()

@@ -1,30 +1,33 @@
 """Methods that make a calibration from detections, by name.
 
-Floor 3.
+Floor 3.  Each is a function in a file of its own that has its name, loaded when it is first asked for: one calibration takes one method.
 """
 
 from __future__ import annotations
 
+import importlib
 import inspect
+from collections import UserDict
 from collections.abc import Callable
 from typing import Any
 
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.target import Detections
 from orthoscope.methods.calibration import Calibration
-from orthoscope.methods.decoupled import decoupled
-from orthoscope.methods.fccm import fccm
-from orthoscope.methods.mldc import mldc
-from orthoscope.methods.nmldc import nmldc
 
 __all__ = ["METHODS", "calibrate", "settings_of"]
 
-METHODS: dict[str, Callable[..., Calibration]] = {
-    "decoupled": decoupled,
-    "fccm": fccm,
-    "mldc": mldc,
-    "nmldc": nmldc,
-}
+
+class _Methods(UserDict[str, Any]):
+    """Functions by name; what stands in the table is the function, or the name of its file until it is asked for."""
+
+    def __getitem__(self, name: str) -> Callable[..., Calibration]:
+        if isinstance(self.data[name], str):
+            self.data[name] = getattr(importlib.import_module(self.data[name]), name)
+        return self.data[name]
+
+
+METHODS = _Methods({name: f"{__name__}.{name}" for name in ("decoupled", "fccm", "mldc", "nmldc")})
 
 
 def calibrate(detections: Detections, *, method: str = "decoupled", **settings: Any) -> Calibration:

@@ -34,8 +34,10 @@ from orthoscope.version import __version__
 __all__ = ["decoupled"]
 
 AUTO = "auto"
+FROM_PAIRS = "from pairs"  # what a candidate's lens is called after step 2, since step 1 may have tried the same formula
 TOO_FEW = (
-    f"the target is as flat and as large as it is said to be: fewer than {FEWEST_VIEWS} views cannot be judged by views that were not used"
+    f"fewer than {FEWEST_VIEWS} views cannot be judged by views that were not used; where nothing else was asked for, the target is taken "
+    "to be as it is said to be, and the lens to follow its formula"
 )
 
 Progress = Callable[[int, int], None]
@@ -73,8 +75,8 @@ def decoupled(
     flat = fccm(without_outliers(detections, lens=base), lens=base, skew=skew)
     used, base, assumptions = flat.detections, flat.settings["lens"], flat.assumptions
     candidates: tuple[Candidate, ...] = ()
-    if len(used.views) < FEWEST_VIEWS:
-        plan = _Plan(("flat",), (FORMULA,), plan.formulas[:1])
+    if len(used.views) < FEWEST_VIEWS and max(map(len, plan)) > 1:
+        plan = _Plan(plan.shapes[:1], plan.through[:1], plan.formulas[:1])
         assumptions = (*assumptions, TOO_FEW)
     elif max(map(len, plan)) > 1:
         rehearsals = [Rehearsal(used, part, base=base, skew=skew) for part in folds_of_views(len(used.views), folds)]
@@ -120,7 +122,7 @@ def _choose(
             done += 1
             if progress:
                 progress(done, to_do)
-        return Contender(shape, formula or (FREE if through == FREE else base), squares)
+        return Contender(shape, f"{formula} {FROM_PAIRS}" if formula else FREE if through == FREE else base, squares)
 
     tried = [contender(shape, plan.through[0]) for shape in plan.shapes]
     taken = richest_unless_worse(tried, corners)
