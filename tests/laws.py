@@ -1,7 +1,7 @@
 """What must be true of every lens: the lenses to try, and rays all over a lens's domain.
 
-`LENSES_TO_TRY` has every name in LENSES as it comes, mild, strong and at its singular places; a lens that is listed here is put
-through every law by `for_every_lens`.
+`LENSES_TO_TRY` has every name in LENSES as it comes, mild, strong and at its singular places; `FREE_LENSES_TO_TRY` some with a
+displacement over them.  A lens that is listed here is put through every law by `for_every_lens`, a formula by `for_every_formula` too.
 """
 
 from __future__ import annotations
@@ -10,14 +10,27 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from orthoscope.models.lens import Lens
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.lens import Formula, Lens
 from orthoscope.models.lenses import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
+from orthoscope.models.spline import Displacement, Lattice
 
-__all__ = ["LENSES_TO_TRY", "WIDE", "directions", "for_every_lens", "places_over", "rays_over"]
+__all__ = [
+    "FREE_LENSES_TO_TRY",
+    "LENSES_TO_TRY",
+    "WIDE",
+    "barrel",
+    "directions",
+    "displaced",
+    "for_every_formula",
+    "for_every_lens",
+    "places_over",
+    "rays_over",
+]
 
 WIDE = 20.0  # tan(87 degrees): as far as the laws look where a lens of the plane has no end of its own; rounding grows with the radius
 
-LENSES_TO_TRY: dict[str, Lens] = {
+LENSES_TO_TRY: dict[str, Formula] = {
     "brown": Brown(),
     "brown mild": Brown(k1=-0.2, k2=0.05, p1=1e-3, p2=-5e-4, k3=-0.01),
     "brown strong": Brown(k1=-0.4, k2=0.15, p1=0.01, p2=-0.02, k3=-0.03),
@@ -49,7 +62,34 @@ LENSES_TO_TRY: dict[str, Lens] = {
     "kannala_brandt folding": KannalaBrandt(k1=-0.2, k2=0.02, k3=-0.01, k4=0.001),
 }
 
-for_every_lens = pytest.mark.parametrize("lens", LENSES_TO_TRY.values(), ids=LENSES_TO_TRY.keys())
+
+def displaced(base: Formula, half: tuple[float, float], size: float, *, cells: tuple[int, int] = (8, 6), seed: int = 0) -> FreeLens:
+    """The lens with random coefficients of this deviation over the rectangle from -half to half of its distorted plane."""
+    high = np.array(half)
+    lattice = Lattice.over(-high, high, cells)
+    return FreeLens(base, Displacement(lattice, size * np.random.default_rng(seed).standard_normal((lattice.splines, 2))))
+
+
+def barrel(strength: float) -> FreeLens:
+    """No distortion but for a displacement of about -strength r^2 (x, y)."""
+    lattice = Lattice.over(np.array([-0.8, -0.8]), np.array([0.8, 0.8]), (16, 16))
+    middles = np.linspace(-0.9, 0.9, 19)  # where the splines have theirs
+    places = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
+    return FreeLens(Brown(), Displacement(lattice, -strength * (places**2).sum(1, keepdims=True) * places))
+
+
+FREE_LENSES_TO_TRY: dict[str, FreeLens] = {
+    "free without displacement": displaced(Brown(k1=-0.2, k2=0.05), (0.7, 0.5), 0.0),
+    "free over brown": displaced(LENSES_TO_TRY["brown mild"], (0.7, 0.5), 0.003),
+    "free over kannala_brandt": displaced(LENSES_TO_TRY["kannala_brandt mild"], (2.0, 1.5), 0.02),  # 115 degrees to either side
+    "free and steep": displaced(Brown(k1=-0.1), (0.7, 0.5), 0.05),  # slopes up to 0.6: distances shrink by half and grow as much
+    "free and folding": barrel(1.0),  # slope 1 - 3 r^2 in all directions: it ends at 0.58, well inside its lattice
+}
+
+for_every_formula = pytest.mark.parametrize("lens", LENSES_TO_TRY.values(), ids=LENSES_TO_TRY.keys())
+for_every_lens = pytest.mark.parametrize(
+    "lens", [*LENSES_TO_TRY.values(), *FREE_LENSES_TO_TRY.values()], ids=[*LENSES_TO_TRY, *FREE_LENSES_TO_TRY]
+)
 
 
 def directions(lens: Lens) -> tuple[ndarray, ndarray]:

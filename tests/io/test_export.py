@@ -9,9 +9,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from orthoscope.geometry.arrays import InputError
-from orthoscope.io.export import EXPORTERS, export, opencv_coefficients
+from laws import FREE_LENSES_TO_TRY, displaced
+from orthoscope.evaluation.difference import frame_grid
+from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
+from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.target import chessboard
+from orthoscope.io.export import EXPORTERS, export, exportable, opencv_coefficients
 from orthoscope.io.opencv_file import read_opencv
+from orthoscope.methods.decoupled import decoupled
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import LENSES, Brown, Division, Fov, KannalaBrandt, Rational
 
@@ -213,3 +218,66 @@ def test_a_file_that_is_none_of_opencvs_is_refused(tmp_path, text, message):
     (tmp_path / "camera.yaml").write_text(text)
     with pytest.raises(InputError, match=message):
         read_opencv(tmp_path / "camera.yaml")
+
+
+FREE = Camera(SIZE, Intrinsics(500.0, 501.25, 319.5, 240.0), displaced(Brown(k1=-0.2, k2=0.05), (0.7, 0.5), 0.001))
+
+
+@pytest.mark.parametrize("tool", EXPORTERS)
+def test_a_formula_is_handed_on_as_it_is(tool):
+    camera = Camera(SIZE, INTRINSICS, MILD)
+    known = exportable(camera, tool)
+    assert known.camera is camera
+    assert (known.apart_px, known.farthest_px) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("tool", EXPORTERS)
+def test_of_a_free_lens_the_nearest_formula_is_handed_on_with_what_it_costs(tmp_path, tool):
+    known = exportable(FREE, tool)
+    export(known.camera, tmp_path / "camera.yaml", tool)  # which the free lens itself cannot be
+    rays = FREE.unproject(frame_grid(SIZE))
+    apart = np.hypot(*(known.camera.project(rays) - FREE.project(rays)).T)
+    assert_allclose((known.apart_px, known.farthest_px), (apart.mean(), apart.max()), rtol=1e-9)
+    assert known.where == "over the frame"
+    assert 0.0 < known.apart_px < known.farthest_px < 2.0  # displacements of half a pixel
+
+
+def test_a_free_lens_without_displacement_costs_nothing():
+    known = exportable(Camera(SIZE, FREE.intrinsics, FREE_LENSES_TO_TRY["free without displacement"]), "opencv")
+    assert isinstance(known.camera.lens, Brown)
+    assert known.farthest_px < 1e-6
+
+
+def test_a_free_lens_itself_is_refused_and_nothing_written(tmp_path):
+    for tool in EXPORTERS:
+        with pytest.raises(InputError, match="cannot hold this free lens exactly"):
+            export(FREE, tmp_path / "camera.yaml", tool)
+    assert not (tmp_path / "camera.yaml").exists()
+
+
+def test_with_the_calibration_the_nearest_is_the_one_where_corners_were_seen():
+    board = chessboard(9, 6, 0.025)
+    rng = np.random.default_rng(0)
+    seen = simulate_detections(Scene(FREE, board, random_views(FREE, board, 8, rng=rng, fill=(0.3, 0.4))), noise_px=0.1, rng=rng)
+    calibration = decoupled(seen, lens="free", target="flat")
+    near, everywhere = exportable(calibration.camera, "opencv", made_from=calibration), exportable(calibration.camera, "opencv")
+    assert (near.where, everywhere.where) == ("where corners were seen", "over the frame")
+    rays = calibration.camera.unproject(np.concatenate([view.pixels for view in seen.views]))
+    wanted = calibration.camera.project(rays)
+    apart = [np.hypot(*(known.camera.project(rays) - wanted).T) for known in (near, everywhere)]
+    assert_allclose((near.apart_px, near.farthest_px), (apart[0].mean(), apart[0].max()), rtol=1e-9)
+    assert (apart[0] ** 2).sum() <= (apart[1] ** 2).sum()
+
+
+def test_where_no_formula_of_the_tool_sees_so_far_there_is_no_camera_for_it():
+    wide = Camera(SIZE, Intrinsics(150.0, 150.0, 320.0, 240.0), displaced(KannalaBrandt(), (2.2, 1.7), 0.002))
+    assert isinstance(exportable(wide, "ros").camera.lens, KannalaBrandt)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(EXPORTERS, "plain", EXPORTERS["ros"]._replace(lenses=("brown", "rational")))
+        with pytest.raises(CalibrationError, match="none of brown, rational sees as far"):
+            exportable(wide, "plain")
+
+
+def test_a_tool_that_is_not_known_is_refused_for_a_free_lens_too():
+    with pytest.raises(InputError, match="no file for 'matlab' can be written"):
+        exportable(FREE, "matlab")

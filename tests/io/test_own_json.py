@@ -12,15 +12,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from laws import for_every_lens
+from laws import FREE_LENSES_TO_TRY, for_every_lens
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.geometry.target import Detections, Outlier, SetAside, Target, View, chessboard
 from orthoscope.io.json_layout import lay_out
 from orthoscope.io.own_json import load, load_calibration, load_camera, load_detections, save
-from orthoscope.methods.calibration import Calibration, Uncertainty
+from orthoscope.methods.calibration import Calibration, Candidate, Uncertainty
 from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.target_shape import TargetShape
 
 BOARD = chessboard(4, 3, 0.025)
 CAMERA = Camera((640, 480), Intrinsics(500.1, 501.3, 1 / 3, 240.0, 0.1), Brown(k1=-0.2, p1=1e-17))
@@ -52,6 +55,25 @@ def some_calibration() -> Calibration:
     )
 
 
+def a_decoupled_calibration() -> Calibration:
+    """With all that the default method tells beside a camera."""
+    generator = np.random.default_rng(2)
+    return replace(
+        some_calibration(),
+        camera=Camera((640, 480), CAMERA.intrinsics, FREE_LENSES_TO_TRY["free over brown"]),
+        method="decoupled",
+        settings={"lens": "free", "target": "free", "base": "brown", "through": "free", "skew": False},
+        target_shape=TargetShape("free", 1e-3 * generator.standard_normal((12, 3))),
+        parameters=41.0 + 1 / 3,
+        candidates=(
+            Candidate("flat", "brown", 0.3, 0.01, 0.2),
+            Candidate("smooth", "brown", 1 / 3, float("nan"), 1 / 7),
+            Candidate("free", "free", *[float("nan")] * 3),
+        ),
+        free_camera=Camera((640, 480), CAMERA.intrinsics, FREE_LENSES_TO_TRY["free over kannala_brandt"]),
+    )
+
+
 def assert_same_detections(a: Detections, b: Detections) -> None:
     assert (a.image_size, a.set_aside, a.outliers) == (b.image_size, b.set_aside, b.outliers)
     assert (a.target.name, a.target.grid) == (b.target.name, b.target.grid)
@@ -66,10 +88,20 @@ def assert_same_detections(a: Detections, b: Detections) -> None:
 
 def assert_same_camera(a: Camera, b: Camera) -> None:
     assert (a.image_size, a.intrinsics.as_tuple()) == (b.image_size, b.intrinsics.as_tuple())
-    assert type(a.lens) is type(b.lens)
-    assert_array_equal(a.lens.coefficients, b.lens.coefficients)
+    assert_same_lens(a.lens, b.lens)
     assert (a.lens_frame is None) == (b.lens_frame is None)
     assert a.lens_frame is None or b.lens_frame is None or a.lens_frame.as_tuple() == b.lens_frame.as_tuple()
+
+
+def assert_same_lens(a: Lens, b: Lens) -> None:
+    assert type(a) is type(b)
+    assert_array_equal(a.coefficients, b.coefficients)
+    if isinstance(a, FreeLens) and isinstance(b, FreeLens):
+        assert_same_lens(a.base, b.base)
+        assert_array_equal(a.over.coefficients, b.over.coefficients)
+        assert_array_equal(a.over.lattice.origin, b.over.lattice.origin)
+        assert_array_equal(a.over.lattice.step, b.over.lattice.step)
+        assert a.over.lattice.shape == b.over.lattice.shape
 
 
 def test_detections_come_back_to_the_last_bit(tmp_path):
@@ -99,8 +131,8 @@ def test_a_target_without_grid_and_lines_comes_back(tmp_path):
     assert_same_detections(load_detections(tmp_path / "detections.json"), detections)
 
 
-def test_a_calibration_comes_back_to_the_last_bit(tmp_path):
-    made = some_calibration()
+@pytest.mark.parametrize("made", [some_calibration(), a_decoupled_calibration()], ids=["fccm", "decoupled"])
+def test_a_calibration_comes_back_to_the_last_bit(tmp_path, made):
     save(made, tmp_path / "calibration.json")
     again = load_calibration(tmp_path / "calibration.json")
     assert_same_camera(again.camera, made.camera)
@@ -110,8 +142,36 @@ def test_a_calibration_comes_back_to_the_last_bit(tmp_path):
         assert_array_equal(pose_a.translation, pose_b.translation)
     assert again.uncertainty.names == made.uncertainty.names
     assert_array_equal(again.uncertainty.covariance, made.uncertainty.covariance)
-    for name in ("method", "settings", "status", "steps", "version", "assumptions"):
+    for name in ("method", "settings", "status", "steps", "version", "assumptions", "parameters"):
         assert getattr(again, name) == getattr(made, name), name
+    assert again.target_shape.kind == made.target_shape.kind
+    assert_array_equal(again.target_shape.displacements, made.target_shape.displacements)
+    assert [candidate[:2] for candidate in again.candidates] == [candidate[:2] for candidate in made.candidates]
+    assert_array_equal([candidate[2:] for candidate in again.candidates], [candidate[2:] for candidate in made.candidates])  # NaN is NaN
+
+
+def test_the_free_camera_beside_a_formula_comes_back(tmp_path):
+    made = a_decoupled_calibration()
+    save(made, tmp_path / "calibration.json")
+    again = load_calibration(tmp_path / "calibration.json").free_camera
+    assert again is not None
+    assert made.free_camera is not None
+    assert_same_camera(again, made.free_camera)
+    save(replace(made, free_camera=None), tmp_path / "calibration.json")
+    assert load_calibration(tmp_path / "calibration.json").free_camera is None
+
+
+def test_what_no_view_could_judge_is_null_in_the_file(tmp_path):
+    save(a_decoupled_calibration(), tmp_path / "calibration.json")
+    content = json.loads((tmp_path / "calibration.json").read_text(), parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert content["candidates"][1:] == [["smooth", "brown", 1 / 3, None, 1 / 7], ["free", "free", None, None, None]]
+
+
+def test_a_flat_target_and_a_formula_are_written_without_saying_so(tmp_path):
+    save(some_calibration(), tmp_path / "calibration.json")
+    content = json.loads((tmp_path / "calibration.json").read_text())
+    assert not {"target_shape", "candidates", "free_camera"} & set(content)
+    assert set(content["camera"]["lens"]) == {"name", "coefficients"}
 
 
 @for_every_lens
@@ -134,7 +194,9 @@ def test_load_gives_whatever_the_file_holds(tmp_path):
         assert type(load(tmp_path / "thing.json")) is type(thing)
 
 
-@pytest.mark.parametrize("thing", [some_detections(), some_calibration(), CAMERA], ids=["detections", "calibration", "camera"])
+@pytest.mark.parametrize(
+    "thing", [some_detections(), some_calibration(), a_decoupled_calibration(), CAMERA], ids=["detections", "fccm", "decoupled", "camera"]
+)
 def test_what_is_saved_twice_is_the_same_to_the_byte(tmp_path, thing):
     save(thing, tmp_path / "one.json")
     save(load(tmp_path / "one.json"), tmp_path / "two.json")
@@ -269,6 +331,28 @@ def test_a_faulty_calibration_is_refused_with_the_file_and_the_fault(tmp_path, c
     with pytest.raises(InputError, match=message) as raised:
         load(path)
     assert path in str(raised.value)
+
+
+DECOUPLED_FAULTS = {
+    "a shape of too few corners": (
+        lambda content: content["target_shape"]["displacements"].pop(),
+        "a shape of 11 corners for a target of 12",
+    ),
+    "a shape of no kind": (lambda content: content["target_shape"].update(kind="wavy"), "target shape 'wavy' is not known"),
+    "a lattice without cells": (lambda content: content["camera"]["lens"]["over"].update(shape=[3, 9]), "expected at least 4 each way"),
+    "a coefficient missing": (lambda content: content["camera"]["lens"]["over"]["coefficients"].pop(), r"coefficients has shape \(98, 2\)"),
+    "a candidate without error": (lambda content: content["candidates"][0].pop(), r"of length 5 - at `\$.candidates\[0\]`"),
+}
+
+
+@pytest.mark.parametrize(("spoil", "message"), DECOUPLED_FAULTS.values(), ids=DECOUPLED_FAULTS.keys())
+def test_a_faulty_shape_lens_or_candidate_is_refused(tmp_path, spoil, message):
+    save(a_decoupled_calibration(), tmp_path / "file.json")
+    content = json.loads((tmp_path / "file.json").read_text())
+    spoil(content)
+    (tmp_path / "file.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=message):
+        load(tmp_path / "file.json")
 
 
 def test_a_rotation_that_is_none_is_refused(tmp_path):

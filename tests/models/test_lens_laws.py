@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_less
 
-from laws import LENSES_TO_TRY, directions, for_every_lens, places_over, rays_over
+from laws import LENSES_TO_TRY, directions, for_every_formula, for_every_lens, places_over, rays_over
 from orthoscope.geometry.arrays import InputError
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import LENSES, Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
@@ -144,12 +144,13 @@ def test_at_the_centre_the_jacobian_is_the_gain(name):
 @for_every_lens
 def test_jacobians_by_each_coefficient_are_those_of_differences(lens):
     x, y = places_over(lens, last=0.9, widest=1.5)
-    apart = np.hypot(x, y) > 1e-2 + 1.2 * lens.domain.hole
-    x, y = x[apart], y[apart]
+    s = np.hypot(x, y)
+    tried = (s > 1e-2 + 1.2 * lens.domain.hole) & (s < 1.8)  # farther out a coefficient's powers carry a displacement over its knots
+    x, y = x[tried], y[tried]
     names = lens.names()
     at = lens.linearise(x, y, names)
-    for name, exact in zip(names, at.by, strict=True):
-        value, step = getattr(lens, name), 1e-6
+    for name, value, exact in zip(names, lens.coefficients, at.by, strict=True):
+        step = 1e-6
         after = lens.with_coefficients(**{name: value + step}).warp(x, y)
         before = lens.with_coefficients(**{name: value - step}).warp(x, y)
         for part, plus, minus in zip(exact, after, before, strict=True):
@@ -157,7 +158,7 @@ def test_jacobians_by_each_coefficient_are_those_of_differences(lens):
             assert_allclose(part, (plus - minus) / (2 * step), rtol=1e-6, atol=1e-7, err_msg=name)
 
 
-@for_every_lens
+@for_every_formula
 def test_coefficients_come_in_the_order_of_their_names(lens):
     again = type(lens)(*lens.coefficients)
     assert dict(zip(lens.names(), again.coefficients, strict=True)) == {name: getattr(lens, name) for name in lens.names()}
