@@ -18,12 +18,15 @@ EXAMPLE = """\b
 Example:
   $ orthoscope calibrate photos/ --target chessboard:9x6:25mm -o camera/
   views      14 used, 0 set aside; 756 corners
-  rms        0.164 px per point (median 0.133, largest 0.48)
-  held out   0.172 ± 0.008 px per point, on views that were not used
-  NCE        0.384 (1 is what rounding to whole pixels would give)
-  camera     fx 533.35 ± 0.34  fy 533.49 ± 0.35  cx 341.60 ± 0.37  cy 234.60 ± 0.40
-  lens       brown  k1 -0.2848 ± 0.0043  k2 0.057 ± 0.033  p1 0.001012 ± 0.000089 ...
-  verdict    0.17 ± 0.01 px on photographs that were not used (0.16 px on those that were); it holds over 71 % of the frame.
+  rms        0.067 px per point (median 0.041, largest 0.29)
+  held out   0.088 ± 0.015 px per point, on views that were not used
+  NCE        0.180 (1 is what rounding to whole pixels would give)
+  misfit     target 0.000 px (F 0.2), lens formula 0.000 px (F 0.7) (the same in every view; F = 1 is noise)
+  camera     fx 534.82 ± 0.28  fy 535.06 ± 0.28  cx 342.13 ± 0.66  cy 239.71 ± 0.63
+  lens       free  k1 -0.2996 ± 0.0034  k2 0.140 ± 0.022  p1 0.00107 ± 0.00014  p2 0.00009 ± 0.00016 ...
+  target     free: corners 0.12 mm rms from where they are said to be, 0.37 mm from the lowest to the highest
+  choice     target free, lens free; next target free, lens brown loses 0.004 px held out
+  verdict    0.09 ± 0.01 px on photographs that were not used (0.07 px on those that were); it holds over 71 % of the frame.
   wrote      camera/detections.json, camera/calibration.json, camera/report.html
 
 \b

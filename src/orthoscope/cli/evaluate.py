@@ -16,10 +16,14 @@ __all__ = ["evaluate"]
 EXAMPLE = """\b
 Examples:
   $ orthoscope evaluate camera/calibration.json
-  $ orthoscope evaluate camera/calibration.json --on other_photos/ --target chessboard:9x6:25mm
+  $ orthoscope evaluate camera/calibration.json --on other_photos/
   views      5 used; 270 corners
   rms        0.158 px per point, camera fixed, poses fitted
   NCE        0.357 (1 is what rounding to whole pixels would give)
+
+\b
+Other photographs show the calibration's own board, whose estimated shape is used;
+with --target they show that one, taken as it is said to be.
 """
 
 

@@ -2,7 +2,7 @@
 
 Floor 7.  The paper's FCCM has k1 and k2 about the principal point, although the simulated lens has tangential terms and a centre of its
 own; its NMLDC and MLDC have `pfet` about a centre of their own.  Fair chances are FCCM with 5 parameters, every other method of METHODS
-as it comes, and, in a table, every method with every lens.
+and, in a table, every method with every lens.
 """
 
 from __future__ import annotations
@@ -15,6 +15,9 @@ from orthoscope.models.lenses import LENSES
 
 __all__ = ["FCCM", "FCCM5", "MLDC", "NMLDC", "PAPER", "Contender", "every_lens", "fair_peers", "with_skew"]
 
+TOLD: dict[str, Mapping[str, Any]] = {  # what a method need not find out: the simulated board is flat, and all tests are on flat boards
+    "decoupled": {"target": "flat", "through": "free"},
+}
 FCCM, NMLDC, MLDC, FCCM5 = "FCCM", "NMLDC", "MLDC", "FCCM 5 parameters"
 
 
@@ -36,12 +39,12 @@ PAPER = (
 def fair_peers() -> tuple[Contender, ...]:
     """FCCM with k1, k2, p1, p2 and k3; and methods that the paper does not know."""
     others = sorted(set(METHODS) - {contender.method for contender in PAPER})
-    return (Contender(FCCM5, "fccm", {"lens": "brown"}), *(Contender(name, name, {}) for name in others))
+    return (Contender(FCCM5, "fccm", {"lens": "brown"}), *(Contender(name, name, TOLD.get(name, {})) for name in others))
 
 
 def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[Contender, ...]:
     """Every method with every lens, the coefficients free that a user gets by naming it."""
-    return tuple(Contender(f"{method} {lens}", method, {"lens": lens}) for method in METHODS for lens in lenses)
+    return tuple(Contender(f"{method} {lens}", method, {"lens": lens, **TOLD.get(method, {})}) for method in METHODS for lens in lenses)
 
 
 def with_skew(contenders: tuple[Contender, ...]) -> tuple[Contender, ...]:

@@ -93,7 +93,7 @@ def _plan(lens: str, target: str, through: str, among: Sequence[str]) -> _Plan:
     Raises InputError for a setting that is none.
     """
     if target not in (AUTO, *SHAPES):
-        raise InputError(f"target {target!r} is not known; expected auto or one of {', '.join(SHAPES)}.")
+        raise InputError(f"target shape {target!r} is not known; expected one of {AUTO}, {', '.join(SHAPES)}.")
     if through not in (AUTO, FREE, FORMULA):
         raise InputError(f"through is {through!r}; expected 'free' (a free lens in step 1), 'formula' (its base alone) or 'auto'.")
     if lens == FREE and through == FORMULA:
