@@ -36,7 +36,7 @@ def test_the_shape_that_is_asked_for_is_the_one_that_is_estimated(calibrate, sha
 def test_a_shape_that_is_none_is_refused(calibrate):
     told, out = calibrate("--shape", "wavy")
     assert told.code == 2
-    assert "expected auto or one of flat, smooth, free" in told.err
+    assert "expected one of auto, flat, smooth, free" in told.err
     assert not (out / "calibration.json").exists()
 
 

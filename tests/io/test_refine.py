@@ -19,7 +19,7 @@ def picture(*, angle: float = 0.1, bend: float = 0.0, blur: float = 1.2, light: 
     dx, dy = x - PLACE[0, 0], y - PLACE[0, 1]
     a, b = dx * np.cos(angle) + dy * np.sin(angle), dy * np.cos(angle) - dx * np.sin(angle)
     saddle = np.tanh((b - bend * a * a / 2) / blur) * np.tanh(a / blur)
-    return np.rint(128 + contrast * saddle + light * dx).astype(np.uint8)
+    return np.rint((128 + contrast * saddle) * (1 + light * dx)).astype(np.uint8)  # light falls on black and on white
 
 
 def fitted(grey: np.ndarray, *, bends=(0.0, 0.0), off=(0.6, -0.8)):
@@ -27,7 +27,7 @@ def fitted(grey: np.ndarray, *, bends=(0.0, 0.0), off=(0.6, -0.8)):
 
 
 @pytest.mark.parametrize(
-    "look", [{}, {"angle": -0.3}, {"blur": 3.0}, {"blur": 0.8}, {"light": 1.0}, {"contrast": -60.0}, {"contrast": 4.0}], ids=str
+    "look", [{}, {"angle": -0.3}, {"blur": 3.0}, {"blur": 0.8}, {"light": 0.006}, {"contrast": -60.0}, {"contrast": 4.0}], ids=str
 )
 def test_a_saddle_is_found_to_a_hundredth_of_a_pixel_whatever_its_look(look):
     saddles = fitted(picture(**look))

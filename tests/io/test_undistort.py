@@ -34,6 +34,25 @@ def test_where_the_camera_saw_nothing_the_picture_is_black():
     assert (straight[120, 160] == 255).all()
 
 
+def test_straight_pictures_keep_their_own_memory_unless_the_next_may_have_it():
+    straightener, other = Straightener(CAMERA), PICTURE[::-1]
+    kept, expected = straightener(PICTURE), undistort(other, CAMERA)
+    first = straightener(PICTURE, reuse=True)
+    assert_array_equal(first, kept)
+    assert straightener(other, reuse=True) is first
+    assert_array_equal(first, expected)
+    assert not np.shares_memory(straightener(other), straightener(other))
+    assert_array_equal(kept, undistort(PICTURE, CAMERA))
+
+
+def test_the_threads_of_opencv_are_as_many_after_a_folder_as_before(tmp_path):
+    before = cv2.getNumThreads()
+    write_image(tmp_path / "a.png", PICTURE)
+    with ThreadPoolExecutor(2) as executor:
+        undistort_photographs([tmp_path / "a.png"], CAMERA, tmp_path / "straight", executor=executor)
+    assert cv2.getNumThreads() == before
+
+
 def test_a_photograph_of_another_size_is_refused():
     with pytest.raises(InputError, match=r"the photograph is 320x200; this camera was calibrated at 320x240"):
         undistort(PICTURE[:200], CAMERA)

@@ -218,7 +218,7 @@ def test_views_that_cannot_tell_the_camera_are_refused_as_by_fccm():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"target": "wavy"}, "target 'wavy' is not known; expected auto or one of flat, smooth, free"),
+        ({"target": "wavy"}, "target shape 'wavy' is not known; expected one of auto, flat, smooth, free"),
         ({"lens": "soap"}, "lens 'soap' is not known"),
         ({"lens": "brown:k9"}, "has no coefficient 'k9'"),
         ({"base": "soap"}, "lens 'soap' is not known"),

@@ -29,6 +29,7 @@ FARTHEST_STRAY = 0.25  # of a square, from the parabolas of a corner's row and c
 LEAST_ALTERNATING = 0.8  # of the corners: glare and shadow hide some
 MOST_CONTRARY = 0.05  # of the corners
 LINE_GOES_ON = 0.75  # of the corners of a line
+LINES_BEFORE = 4  # which a line is compared with
 
 
 def find_chessboard(grey: ndarray, columns: int, rows: int) -> Float[ndarray, "m 2"] | None:
@@ -113,10 +114,14 @@ LADDER = (
 
 
 def _resized(grey: ndarray, side: int) -> ndarray:
-    """A copy whose longer side is `side`; the photograph itself where it is no larger."""
+    """A copy whose longer side is `side`; the photograph itself where it is no larger.  By halves first: five times as quick."""
     longer = max(grey.shape)
     if not 0 < side < longer:
         return grey
+    if longer >= 2 * side and min(grey.shape) >= 2:
+        height, width = (length // 2 for length in grey.shape)
+        half = cv2.resize(grey[: 2 * height, : 2 * width], (width, height), interpolation=cv2.INTER_AREA)
+        return _resized(half, side)
     height, width = (max(1, round(length * side / longer)) for length in grey.shape)
     return cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA)
 
@@ -152,8 +157,8 @@ def _whole_size(grey: ndarray, corners: ndarray, columns: int, rows: int) -> tup
 
 
 def _goes_on(grey: ndarray, grid: ndarray) -> bool:
-    """Whether the last row of a grid is one of the board's, as the others are."""
-    strength = _alternating(grey, grid)
+    """Whether the last row of a grid is one of the board's, as those before it are."""
+    strength = _alternating(grey, grid[-1 - LINES_BEFORE :])
     board, last = strength[:-1], strength[-1]
     sign = np.sign(board.sum())
     return bool((sign * last > 0.5 * np.median(np.abs(board))).mean() >= LINE_GOES_ON)
@@ -164,25 +169,32 @@ def _from_first_corner(grey: ndarray, corners: ndarray, columns: int, rows: int)
     grid = corners.reshape(rows, columns, 2)
     if cross(grid[:1, -1] - grid[:1, 0], grid[-1:, 0] - grid[:1, 0]) < 0:
         grid = grid[:, ::-1]
-    turns = [np.rot90(grid, quarter) for quarter in range(4)]
-    orders = [turned for turned in turns if turned.shape == grid.shape]
-    signs = [np.sign(_alternating(grey, order).sum()) for order in orders]
+    strength = _strengths(grey, grid)
+    quarters = [quarter for quarter in range(4) if np.rot90(grid, quarter).shape == grid.shape]
+    orders = [np.rot90(grid, quarter) for quarter in quarters]
+    signs = [np.sign((-1) ** quarter * _by_turns(np.rot90(strength, quarter)).sum()) for quarter in quarters]  # a quarter swaps squares
     first = min(range(len(orders)), key=lambda i: (signs[i], orders[i][0, 0].sum()))
     return orders[first].reshape(-1, 2)
 
 
 def _alternating(grey: ndarray, grid: ndarray) -> ndarray:
     """The strengths of saddles (rows, columns), every other one's sign turned: a board has one sign throughout."""
-    rows, columns = grid.shape[:2]
-    strength = _saddle_strength(grey, grid.reshape(-1, 2), columns, rows).reshape(rows, columns)
+    return _by_turns(_strengths(grey, grid))
+
+
+def _by_turns(strength: ndarray) -> ndarray:
+    """Every other one's sign turned (rows, columns)."""
+    rows, columns = strength.shape
     return strength * np.where(np.add.outer(np.arange(rows), np.arange(columns)) % 2, -1.0, 1.0)
 
 
-def _saddle_strength(grey: ndarray, corners: ndarray, columns: int, rows: int) -> ndarray:
-    """How much brighter the square between +along and +down and its opposite are than the two others, grey levels.
+def _strengths(grey: ndarray, grid: ndarray) -> ndarray:
+    """How much brighter the square between +along and +down and its opposite are than the two others, grey levels (rows, columns).
 
     Negative where they are darker; 0 where the four squares are not two and two, or one of them is not in the picture.
     """
+    rows, columns = grid.shape[:2]
+    corners = grid.reshape(-1, 2)
     shape = grid_shape(corners, columns, rows)
     steps = np.array([0.15, 0.25, 0.35])  # squares from the corner
     along = np.array([1, -1, 1, -1])[:, None, None] * steps[:, None]
@@ -195,4 +207,4 @@ def _saddle_strength(grey: ndarray, corners: ndarray, columns: int, rows: int) -
     squares = grey[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)].mean(-1)  # (m, 4)
     bright = squares[:, :2].min(1) - squares[:, 2:].max(1)
     dark = squares[:, 2:].min(1) - squares[:, :2].max(1)
-    return np.where(inside, np.maximum(bright, 0.0) - np.maximum(dark, 0.0), 0.0)
+    return np.where(inside, np.maximum(bright, 0.0) - np.maximum(dark, 0.0), 0.0).reshape(rows, columns)

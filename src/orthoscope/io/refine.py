@@ -2,9 +2,9 @@
 
 Floor 5.  Windows are measured in the board's own squares, so that a near and a far corner, a large and a small photograph are treated
 alike: 0.25 squares to each side for cornerSubPix, which only has to come near and goes astray where a larger window meets the board's
-margin, and 0.45 for the fit, which weighs its pixels the less the farther out they are.  Photographs with large squares are reduced
-first: beyond some 40 px a square more pixels add time, not truth.  Where the fit moves too far, or the picture is no saddle,
-cornerSubPix has the last word.  docs/detection.md has the figures.
+margin, and 0.45 for the fit, which weighs its pixels the less the farther out they are.  Only the board's part of a photograph is
+looked at, and where squares are large it is reduced first: beyond some 50 px a square more pixels add time, not truth.  Where the fit
+moves too far, or the picture is no saddle, cornerSubPix has the last word.  docs/detection.md has the figures.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ __all__ = ["refined"]
 
 NEAR_SHARE = 0.25  # of a square: half the window of cornerSubPix
 SHARE = 0.45  # of a square: half the window of the fit
-LARGE = 40.0  # px a square: larger ones are reduced
+USUAL = 50.0  # px a square: larger ones are reduced to about this
 REACH = 18.0  # px: half the largest window
 SMOOTHING = 0.5  # px, sigma: what a camera sharpened until it jumps from pixel to pixel has slopes again
 FARTHEST = 0.35  # of a square: a fit that ends farther from its start is not believed,
@@ -32,9 +32,11 @@ def refined(grey: ndarray, rough: Float[ndarray, "m 2"], columns: int, rows: int
 
     grey: (h,w) uint8.
     """
-    shrink = max(1, int(np.median(nearest_neighbour(rough, columns, rows)) // LARGE))
-    small = _reduced(grey, shrink)
-    near = _near(small, (rough + 0.5) / shrink - 0.5, columns, rows)
+    square = nearest_neighbour(rough, columns, rows)
+    shrink = max(1, round(float(np.median(square)) / USUAL))
+    first, part = _surroundings(grey, rough, square.max())
+    small = _reduced(part, shrink)
+    near = _near(small, (rough - first + 0.5) / shrink - 0.5, columns, rows)
     shape = grid_shape(near, columns, rows)
     saddles = fit_saddles(
         cv2.GaussianBlur(small, (0, 0), SMOOTHING),
@@ -45,7 +47,14 @@ def refined(grey: ndarray, rough: Float[ndarray, "m 2"], columns: int, rows: int
     )
     allowed = np.maximum(FARTHEST * nearest_neighbour(near, columns, rows), 1.0)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > LEAST_EXPLAINED)
-    return (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5
+    return (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
+
+
+def _surroundings(grey: ndarray, corners: Float[ndarray, "m 2"], margin: float) -> tuple[Float[ndarray, " 2"], ndarray]:
+    """The part of a picture that holds the corners with a margin, and where it begins (x, y)."""
+    x, y = np.maximum(np.floor(corners.min(0) - margin), 0).astype(int)
+    right, bottom = np.maximum(np.ceil(corners.max(0) + margin), (x, y)).astype(int) + 1
+    return np.array([x, y], dtype=float), grey[y:bottom, x:right]
 
 
 def _reduced(grey: ndarray, shrink: int) -> ndarray:
@@ -60,7 +69,7 @@ def _near(grey: ndarray, corners: ndarray, columns: int, rows: int) -> ndarray:
     """cornerSubPix with a window that suits each corner's own squares."""
     radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, columns, rows)), 2, REACH).astype(int)
     places = np.clip(corners, 0, np.array(grey.shape[::-1]) - 1).astype(np.float32)
-    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-3)
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-2)
     for size in np.unique(radius):
         which = radius == size
         some = np.ascontiguousarray(places[which]).reshape(-1, 1, 2)

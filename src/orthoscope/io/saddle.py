@@ -1,32 +1,39 @@
-"""Blurred saddles, fitted to the picture around each corner of a chessboard; all corners at once.
+"""Blurred saddles, fitted to the picture around each corner of a chessboard; many corners at once.
 
 Floor 5.  Two edges cross at the corner c, along the directions a1 and a2 (angles t1, t2), with normals n1 and n2.  The picture is
 
-    I(x) = m + g.(x - c) + C tanh(d1 / w) tanh(d2 / w),        d_i = n_i.(x - c) - k_i (a_i.(x - c))^2 / 2
+    I(x) = m + g.x + (C + r g.x) S,      S = tanh(D1) tanh(D2),      D_i = +-(n_i.(x - c) - k_i (a_i.(x - c))^2 / 2) / w
 
-m grey, g uneven light, C contrast (positive where the square between +a1 and +a2 is the bright one), w blur.  The curvatures k_i are
-given: without them a window on a bent edge sees its middle beside the corner.  Nine unknowns, Gauss-Newton; tanh stands for the error
+m grey, C contrast (positive where the square between +a1 and +a2 is the bright one: D2 takes the sign -), w blur.  g is uneven light:
+it makes contrast uneven as it does grey, and as much of it, r = C / m; left out, that moves a corner by a thousandth of its window.
+The curvatures k_i are given: without them a window on a bent edge sees its middle beside the corner.  tanh stands for the error
 function, whose shape it has to within what a lens's blur differs from a Gaussian, and its slope is 1 - tanh^2.  A pixel's weight falls
 from 1 at the corner to 0 at the side of a window in the board's own directions; the window follows the corner, so that whatever the
 model lacks (sharpening, white that bleeds into black) is seen symmetrically and moves nothing.
+
+Gauss-Newton on c, t1, t2 and log w.  m, g and C are linear: each step finds them anew beside C times the step, so that they need no
+start.  A few corners tell the blur from which all begin.  The first steps look at the inner half of a window, a quarter of its pixels;
+to the whole, one or two are left, and a corner that has arrived takes no part in the next.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.io.saddle_windows import COLUMNS, Shapes, Windows
 
 __all__ = ["Saddles", "fit_saddles"]
 
-STEPS = 10
-STILL = 1e-3  # px: a corner that moves less has arrived
+STAGES = ((0.5, 0.05), (1.0, 0.01))  # share of the window, and px: a corner that moves less has arrived (what is left is its square)
+STEPS = 8  # of each stage, at most
+LEAST_SIDE = 6.0  # px: half the smallest window that is only a share of one
+FEW = 12  # corners that tell the blur
 LEAST_BLUR = 0.75  # px: a pixel's own width; a sharpened edge is steeper, and without a floor the steps then jump from pixel to pixel
 LARGEST_STEP = np.array([1.0, 1.0, 0.2, 0.2, 0.5])  # of x, y (px), t1, t2 (radians), log w
-DAMPING = 1e-3  # of each unknown's own curvature
+DAMPING = np.array([1e-3] * 5 + [1e-6] * 2 + [0.03] * 2)  # of each column's own square; light changes little in a window
 PIXELS_AT_ONCE = 60_000  # of all windows together, so that the arrays stay in cache
 
 
@@ -46,98 +53,76 @@ def fit_saddles(
     grey: (h,w) uint8.  along, down: from a corner to the sides of its window, pixels, in the directions of its two edges.
     bends: curvature of the two edges, 1/px.  Where the steps do not settle the last place is given, with what it explains.
     """
-    reach = int(np.ceil((np.abs(along) + np.abs(down)).max())) + 1
-    padded = cv2.copyMakeBorder(grey, reach, reach, reach, reach, cv2.BORDER_REPLICATE)
-    at_once = max(1, PIXELS_AT_ONCE // (2 * reach + 1) ** 2)
-    some = [slice(i, i + at_once) for i in range(0, len(start), at_once)]
-    parts = [_Windows(padded, reach, start[s], along[s], down[s], bends[s]).fit() for s in some]
-    return Saddles(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+    fit = _Fit(grey, start, along, down, bends)
+    fit.begin_with_one_blur()
+    for share, still in STAGES:
+        fit.settle(fit.by_size, share, still)
+    return Saddles(fit.shapes.places, fit.contrast, fit.explained)
 
 
-class _Windows:
-    """Some corners' windows, each a row of k pixels; what is known of them in float32, and the nine unknowns in float64."""
+class _Fit:
+    """All corners of a picture on their way; by_size: their order, windows of one size together."""
 
-    def __init__(self, padded: ndarray, reach: int, start: ndarray, along: ndarray, down: ndarray, bends: ndarray) -> None:
-        height, width = (side - 2 * reach for side in padded.shape)
-        offset = np.arange(-reach, reach + 1)
-        self.middle = np.clip(np.rint(start).astype(int), 0, (width - 1, height - 1))
-        columns, rows = (self.middle[:, axis, None] + offset for axis in (0, 1))
-        self.intensity = padded[rows[:, :, None] + reach, columns[:, None, :] + reach].reshape(len(start), -1).astype(np.float32)
-        inside = ((rows >= 0) & (rows < height))[:, :, None] & ((columns >= 0) & (columns < width))[:, None, :]
-        self.inside = inside.reshape(len(start), -1).astype(np.float32)
-        self.x, self.y = (grid.astype(np.float32).ravel() for grid in np.meshgrid(offset, offset))
-        area = along[:, 0] * down[:, 1] - along[:, 1] * down[:, 0]
-        area = np.where(np.abs(area) < 1e-9, 1e-9, area)
-        self.to_window = np.stack([down[:, 1], -down[:, 0], -along[:, 1], along[:, 0]]) / area  # turns pixels into halves of the window
-        self.bends = bends
-        self.place = start - self.middle
-        self.angles = np.stack([np.arctan2(along[:, 1], along[:, 0]), np.arctan2(down[:, 1], down[:, 0])], axis=1)
-        self.log_blur = np.zeros(len(start))
-        self.linear = np.tile([0.0, 1.0, 0.0, 0.0], (len(start), 1))  # m, C, g
+    def __init__(self, grey: ndarray, start: ndarray, along: ndarray, down: ndarray, bends: ndarray) -> None:
+        self.grey, self.along, self.down = grey, along, down
+        angles = np.stack([np.arctan2(along[:, 1], along[:, 0]), np.arctan2(down[:, 1], down[:, 0])], axis=1)
+        self.shapes = Shapes(start.astype(float), angles, np.ones(len(start)), bends, np.zeros(len(start)))
+        self.contrast, self.explained = np.zeros((2, len(start)))
+        self.area = 4.0 * np.abs(along[:, 0] * down[:, 1] - along[:, 1] * down[:, 0])
+        self.by_size = np.argsort(self.area, kind="stable")
 
-    def fit(self) -> Saddles:
-        """Gauss-Newton until no corner moves."""
-        columns, weights = self._linearised()
-        self.linear = _solved(columns[:, 5:], weights, self.intensity, damping=1e-6)
-        columns[:, :5] *= self.linear[:, 1, None, None].astype(np.float32)  # they were made for a contrast of 1
-        left = self.intensity
-        for _ in range(STEPS):
-            left = self.intensity - (self.linear[:, None].astype(np.float32) @ columns[:, 5:])[:, 0]
-            step = _solved(columns, weights, left, damping=DAMPING)
-            moved = np.clip(step[:, :5], -LARGEST_STEP, LARGEST_STEP)
-            self.place += moved[:, :2]
-            self.angles += moved[:, 2:4]
-            self.log_blur = np.maximum(self.log_blur + moved[:, 4], np.log(LEAST_BLUR))
-            self.linear += step[:, 5:]
-            if np.abs(moved[:, :2]).max() < STILL:
-                break
-            columns, weights = self._linearised()
-        return Saddles(self.middle + self.place, self.linear[:, 1], self._explained(left, weights))
+    def begin_with_one_blur(self) -> None:
+        """The middle one of a few corners' blurs, for all."""
+        few = self.by_size[:: max(1, len(self.by_size) // FEW)]
+        self.settle(few, *STAGES[0])
+        self.shapes.blur[:] = np.median(self.shapes.blur[few])
 
-    def _linearised(self) -> tuple[ndarray, ndarray]:
-        """dI / d(x, y, t1, t2, log w, m, C, g), (n, 9, k), and the weights (n, k)."""
-        dx, dy = self.x - _column(self.place[:, 0]), self.y - _column(self.place[:, 1])
-        (c1, c2), (s1, s2) = (tuple(map(_column, turn(self.angles).T)) for turn in (np.cos, np.sin))
-        k1, k2 = map(_column, self.bends.T)
-        w = _column(np.exp(self.log_blur))
-        a1, a2 = dx * c1 + dy * s1, dx * c2 + dy * s2
-        d1, d2 = dy * c1 - dx * s1 - (0.5 * k1) * a1 * a1, dy * c2 - dx * s2 - (0.5 * k2) * a2 * a2
-        e1, e2 = np.tanh(d1 / w), np.tanh(-d2 / w)  # so that the square between +a1 and +a2 counts as positive
-        contrast = _column(self.linear[:, 1]) / w
-        f1, f2 = contrast * (1.0 - e1 * e1) * e2, -contrast * (1.0 - e2 * e2) * e1  # dI/dd1, dI/dd2
-        columns = np.empty((len(dx), 9, dx.shape[1]), dtype=np.float32)
-        columns[:, 0] = f1 * (s1 + k1 * a1 * c1) + f2 * (s2 + k2 * a2 * c2)
-        columns[:, 1] = f1 * (k1 * a1 * s1 - c1) + f2 * (k2 * a2 * s2 - c2)
-        columns[:, 2] = -f1 * a1
-        columns[:, 3] = -f2 * a2
-        columns[:, 4] = -(f1 * d1 + f2 * d2)
-        columns[:, 5] = 1.0
-        columns[:, 6] = e1 * e2
-        columns[:, 7], columns[:, 8] = dx, dy
-        return columns, self._weights(dx, dy)
+    def settle(self, which: ndarray, share: float, still: float) -> None:
+        """Steps in a share of the window until each corner has moved by less than `still` px, or has had its steps."""
+        side = np.minimum(np.hypot(*self.along.T), np.hypot(*self.down.T))
+        shares = np.clip(LEAST_SIDE / np.maximum(side, 1e-9), share, 1.0)[:, None]
+        at_once = max(1, int(PIXELS_AT_ONCE / max((shares[:, 0] ** 2 * self.area).max(), 1.0)))
+        for i in range(0, len(which), at_once):
+            some = which[i : i + at_once]
+            windows = Windows(self.grey, self.shapes.places[some], shares[some] * self.along[some], shares[some] * self.down[some])
+            rows = np.arange(len(some))
+            for _ in range(STEPS):
+                moved = self._step(some[rows], windows.sums(rows, self.shapes.of(some[rows])), windows.level[rows])
+                rows = rows[moved > still]
+                if not len(rows):
+                    break
 
-    def _weights(self, dx: ndarray, dy: ndarray) -> ndarray:
-        """1 at the corner, 0 at the window's side, smooth between; 0 outside the picture."""
-        xx, xy, yx, yy = map(_column, self.to_window)
-        out = np.maximum(np.abs(xx * dx + xy * dy), np.abs(yx * dx + yy * dy))
-        return np.maximum(1.0 - out * out, 0.0) ** 2 * self.inside
-
-    def _explained(self, left: ndarray, weights: ndarray) -> ndarray:
-        """The share of each window's variance that is not left over."""
-        total = np.maximum(weights.sum(1), 1e-9)
-        mean = (weights * self.intensity).sum(1) / total
-        variance = (weights * (self.intensity - mean[:, None]) ** 2).sum(1)
-        return 1.0 - (weights * left * left).sum(1) / np.maximum(variance, 1e-9)
+    def _step(self, here: ndarray, sums: Float[ndarray, "n 10 10"], level: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
+        """One step of these corners; how far each moved, px."""
+        shapes = self.shapes
+        solution, self.explained[here] = _solved(sums)
+        contrast = self.contrast[here] = solution[:, 5]
+        step = _in_pixels(solution[:, :5] / np.where(np.abs(contrast) < 1e-9, 1e-9, contrast)[:, None], shapes.of(here))
+        step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+        shapes.places[here] += step[:, :2]
+        shapes.angles[here] += step[:, 2:4]
+        shapes.blur[here] = np.maximum(shapes.blur[here] * np.exp(step[:, 4]), LEAST_BLUR)
+        shapes.relief[here] = np.clip(contrast / np.maximum(level + solution[:, 6], 1.0), -1.0, 1.0)
+        return np.abs(step[:, :2]).max(1)
 
 
-def _solved(columns: ndarray, weights: ndarray, right: ndarray, *, damping: float) -> ndarray:
-    """Damped weighted least squares in each window: columns (n, p, k), weights and right side (n, k), solution (n, p)."""
-    weighted = columns * weights[:, None]
-    normal = (weighted @ columns.transpose(0, 2, 1)).astype(float)
+def _solved(sums: Float[ndarray, "n 10 10"]) -> tuple[Float[ndarray, "n 9"], Float[ndarray, " n"]]:
+    """The damped least squares solution in each window, and the share of its variance that this explains."""
+    normal, right, square = sums[:, :-1, :-1], sums[:, :-1, -1], sums[:, -1, -1]
     diagonal = np.einsum("npp->np", normal)
-    normal += np.eye(normal.shape[1]) * (damping * diagonal + 1e-6)[:, None]
-    return np.linalg.solve(normal, (weighted @ right[:, :, None]).astype(float))[:, :, 0]
+    damped = normal + np.eye(COLUMNS) * (DAMPING * diagonal + 1e-6)[:, None]
+    solution = np.linalg.solve(damped, right[:, :, None])[:, :, 0]
+    left = square - (solution * (2.0 * right - (normal @ solution[:, :, None])[:, :, 0])).sum(1)
+    variance = square - right[:, 6] ** 2 / np.maximum(diagonal[:, 6], 1e-9)
+    return solution, 1.0 - left / np.maximum(variance, 1e-9)
 
 
-def _column(values: ndarray) -> ndarray:
-    return values.astype(np.float32)[:, None]
+def _in_pixels(column_steps: Float[ndarray, "n 5"], shapes: Shapes) -> Float[ndarray, "n 5"]:
+    """The step of x, y, t1, t2 and log w that makes such multiples of the first five columns."""
+    f1, f2, turn1, turn2, blurring = column_steps.T
+    (c1, c2), (s1, s2) = np.cos(shapes.angles).T, np.sin(shapes.angles).T
+    area = s1 * c2 - c1 * s2
+    scale = shapes.blur / np.where(np.abs(area) < 0.01, 0.01, area)
+    x, y = scale * (c2 * f1 + c1 * f2), scale * (s2 * f1 + s1 * f2)
+    along1, along2 = c1 * x + s1 * y, c2 * x + s2 * y
+    return np.stack([x, y, shapes.bends[:, 0] * along1 - turn1, shapes.bends[:, 1] * along2 + turn2, -blurring], axis=1)
