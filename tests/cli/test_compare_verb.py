@@ -92,7 +92,7 @@ def test_too_few_photographs_leave_with_1(run, calibrated, tmp_path):
 
 @pytest.mark.slow
 def test_left_alone_it_compares_every_method_in_two_processes_on_photographs(run, photos, tmp_path):
-    told = run("compare", photos, "--target", "chessboard:9x6:25mm", "--jobs", "2", "--json", "-o", tmp_path)
+    told = run("compare", photos, "--target", "chessboard:9x6:25mm", "--jobs", "2", "--folds", "2", "--json", "-o", tmp_path)
     assert told.code == 0, told.err
     numbers = json.loads(told.out)
     assert {entry["name"] for entry in numbers["compared"]} == set(USUAL)

@@ -61,14 +61,10 @@ def some_corners(seed: int) -> Calibration:
 
 
 FITS: dict[str, Callable[[int], Calibration]] = {
-    "12 whole boards": lambda seed: fccm(perfect(NARROW, 12, seed)[1], lens="brown"),
     "5 views": lambda seed: fccm(perfect(NARROW, 5, seed)[1], lens="brown"),
-    "15 boards that leave the frame": lambda seed: fccm(perfect(NARROW, 15, seed, whole=False)[1], lens="brown"),
     "15 views of some corners": some_corners,
     "a lens with more coefficients than it needs": lambda seed: fccm(perfect(NARROW, 12, seed)[1], lens="brown:k1,k2,p1,p2,k3,s1,s2,s3,s4"),
     "a lens past 90 degrees": lambda seed: fccm(perfect(WIDE, 12, seed)[1], lens="kannala_brandt"),
-    "few corners": lambda seed: fccm(perfect(NARROW, 13, seed, board=chessboard(6, 4, 0.03))[1], lens="brown"),
-    "many corners": lambda seed: fccm(perfect(NARROW, 8, seed, board=chessboard(14, 10, 0.015))[1], lens="brown"),
 }
 
 
