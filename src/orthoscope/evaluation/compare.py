@@ -18,12 +18,12 @@ from functools import partial
 import numpy as np
 
 from orthoscope.evaluation.entrants import USUAL, Entrant, parse_entrant
-from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
+from orthoscope.evaluation.metrics import held_out_nce
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.geometry.target import Detections
 from orthoscope.methods import METHODS
 from orthoscope.methods.calibration import Calibration
-from orthoscope.methods.held_out import FEWEST_VIEWS, HeldOut, folds_of_views, held_out
+from orthoscope.methods.held_out import FEWEST_VIEWS, folds_of_views, held_out
 from orthoscope.methods.outliers import without_outliers
 
 __all__ = ["Comparison", "Standing", "compare", "paired_difference"]
@@ -166,20 +166,7 @@ def _judged(standing: Standing, used: Detections, folds: int, executor: Executor
     if missing := int(np.isnan(squares).sum()):
         failure = f"{missing} of {len(squares)} photographs could not be judged: calibrated without them, no camera sees them"
         return replace(standing, squares=squares, failure=failure)
-    return replace(standing, squares=squares, held_out_px=unseen.rms_px, error_px=unseen.standard_error_px, nce=_nce(unseen, used))
-
-
-def _nce(unseen: HeldOut, used: Detections) -> float:
-    """NCE over the corners of all held-out views; NaN where no straight image would hold any."""
-    total, corners = 0.0, 0
-    for i, (camera, shape, pose) in enumerate(zip(unseen.cameras, unseen.shapes, unseen.camera_from_target, strict=True)):
-        assert camera is not None  # every view was judged
-        assert pose is not None
-        estimated, observed = lateral_errors(camera, (pose,), used.only([i]), shape=shape)
-        if len(observed):
-            total += len(observed) * normalised_calibration_error(estimated, observed, camera.intrinsics)
-            corners += len(observed)
-    return total / corners if corners else float("nan")
+    return replace(standing, squares=squares, held_out_px=unseen.rms_px, error_px=unseen.standard_error_px, nce=held_out_nce(unseen, used))
 
 
 def _ranked(standings: Sequence[Standing], corners: Float[ndarray, " m"]) -> tuple[Standing, ...]:

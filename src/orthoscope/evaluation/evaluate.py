@@ -6,7 +6,8 @@ beside it.  What held-out photographs cannot show, a target or a formula that is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -14,11 +15,10 @@ from functools import partial
 import numpy as np
 
 from orthoscope.evaluation.coverage import share_covered
-from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
+from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
 from orthoscope.evaluation.misfit import Misfit, misfit
 from orthoscope.evaluation.verdict import Findings, ViewError, corners_beyond, suspects_among, verdict_on, warnings_about
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Detections
 from orthoscope.methods import METHODS
 from orthoscope.methods.calibration import Calibration, residuals_of, rms
@@ -129,24 +129,7 @@ def evaluate(
 def _nce(calibration: Calibration, unseen: HeldOut) -> float:
     """NCE over the views that were held out; over the training views where none was."""
     detections = calibration.detections
-    total, corners = 0.0, 0
-    for camera, shape, poses, views in _by_camera(unseen):
-        estimated, observed = lateral_errors(camera, poses, detections.only(views), shape=shape)
-        if len(observed):
-            total += len(observed) * normalised_calibration_error(estimated, observed, camera.intrinsics)
-        corners += len(observed)
-    if corners:
-        return total / corners
+    if not math.isnan(nce := held_out_nce(unseen, detections)):
+        return nce
     estimated, observed = lateral_errors(calibration.camera, calibration.camera_from_target, detections, shape=calibration.target_shape)
     return normalised_calibration_error(estimated, observed, calibration.camera.intrinsics) if len(observed) else float("nan")
-
-
-def _by_camera(unseen: HeldOut) -> Iterator[tuple[Camera, TargetShape | None, list[Pose], list[int]]]:
-    """The camera of each fold with the target's shape, the poses of the views that it was tried on, and which views these are."""
-    folds: dict[int, list[int]] = {}
-    for i, camera in enumerate(unseen.cameras):
-        folds.setdefault(id(camera), []).append(i)
-    for views in folds.values():
-        camera, poses = unseen.cameras[views[0]], [pose for i in views if (pose := unseen.camera_from_target[i])]
-        if camera is not None:
-            yield camera, unseen.shapes[views[0]], poses, views

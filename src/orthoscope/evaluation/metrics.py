@@ -5,7 +5,7 @@ Floor 4.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,10 +13,11 @@ from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.geometry.target import Detections
 from orthoscope.methods.calibration import points_of
+from orthoscope.methods.held_out import HeldOut
 from orthoscope.models.camera import WIDEST, Camera, Intrinsics
 from orthoscope.models.target_shape import TargetShape
 
-__all__ = ["lateral_errors", "normalised_calibration_error"]
+__all__ = ["held_out_nce", "lateral_errors", "normalised_calibration_error"]
 
 
 def normalised_calibration_error(estimated: Float[ndarray, "n 3"], observed: Float[ndarray, "n 3"], intrinsics: Intrinsics) -> float:
@@ -49,3 +50,25 @@ def lateral_errors(
     usable = (rays[:, 2] > np.cos(WIDEST)) & (observed[:, 2] > np.cos(WIDEST) * np.sqrt((observed**2).sum(-1)))
     rays, observed = rays[usable], observed[usable]
     return rays * (observed[:, 2] / rays[:, 2])[:, None], observed
+
+
+def held_out_nce(unseen: HeldOut, detections: Detections) -> float:
+    """NCE over the corners of all views that were held out; NaN where none was, or no straight image would hold any."""
+    total, corners = 0.0, 0
+    for camera, shape, poses, views in _by_camera(unseen):
+        estimated, observed = lateral_errors(camera, poses, detections.only(views), shape=shape)
+        if len(observed):
+            total += len(observed) * normalised_calibration_error(estimated, observed, camera.intrinsics)
+        corners += len(observed)
+    return total / corners if corners else float("nan")
+
+
+def _by_camera(unseen: HeldOut) -> Iterator[tuple[Camera, TargetShape | None, list[Pose], list[int]]]:
+    """The camera of each fold with the target's shape, the poses of the views that it was tried on, and which views these are."""
+    folds: dict[int, list[int]] = {}
+    for i, camera in enumerate(unseen.cameras):
+        folds.setdefault(id(camera), []).append(i)
+    for views in folds.values():
+        camera, poses = unseen.cameras[views[0]], [pose for i in views if (pose := unseen.camera_from_target[i])]
+        if camera is not None:
+            yield camera, unseen.shapes[views[0]], poses, views

@@ -16,7 +16,6 @@ from orthoscope.methods.lens_fit import FOCAL, about_principal_point, converted,
 from orthoscope.methods.reprojection import INTRINSICS
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import parse_lens
-from orthoscope.solve.losses import Huber
 
 __all__ = ["by_simplicity", "formula_from_pairs", "nearest_formula", "pairs_of"]
 
@@ -44,7 +43,7 @@ def formula_from_pairs(fit: JointFit, lens: str) -> tuple[Camera, tuple[str, ...
     free = (*(name for name in fit.problem.free if set(name.split("=")) <= set(INTRINSICS)), *coefficients)
     rays, pixels = pairs_of(fit)
     starts = [replace(fit.estimate.camera, lens=kind(**start)) for start in kind.starts]
-    camera = fit_pairs(about_principal_point(rays, pixels, free), starts, loss=Huber(fit.far_px)).unknowns
+    camera = fit_pairs(about_principal_point(rays, pixels, free), starts, loss=fit.loss).unknowns
     if not np.isfinite(camera.project(rays)).all():
         raise CalibrationError(f"the lens {lens} does not reach all corners. Use one that reaches farther, such as --lens kannala_brandt.")
     return camera, free

@@ -53,9 +53,9 @@ class JointFit:
     status: str
 
     @property
-    def far_px(self) -> float:
-        """Errors count less from here on, pixels."""
-        return FAR * float(np.sqrt(self.evidence.noise))
+    def loss(self) -> Huber:
+        """How errors count, for noise as large as was found."""
+        return _loss(self.evidence.noise)
 
     def with_formula(self, camera: Camera, free: Sequence[str]) -> tuple[Float[ndarray, "k k"], float]:
         """For another camera in the place of the estimate's: covariance of its free parameters, and how many the data determine in all."""
@@ -65,7 +65,7 @@ class JointFit:
             measurements, problem.points, free,
             surface=problem.surface, energy=np.zeros((0, 0)), single=problem.single, precisions=problem.precisions,
         )  # fmt: skip
-        known = other.known(other.linearise(self.estimate._replace(camera=camera), Huber(self.far_px)))
+        known = other.known(other.linearise(self.estimate._replace(camera=camera), self.loss))
         return self.evidence.noise * known.camera, len(free) + float(known.surface.sum() + known.singles.sum())
 
     @property
@@ -78,12 +78,7 @@ class JointFit:
         return TargetShape(self.target, without_similarity(points, self.problem.corners(self.estimate) - points, seen))
 
 
-def fit_jointly(
-    flat: Calibration,
-    *,
-    target: str,
-    through: str,
-) -> JointFit:
+def fit_jointly(flat: Calibration, *, target: str, through: str) -> JointFit:
     """Camera, poses and shape together.
 
     flat: a calibration of a flat target to start from; its parameters are freed.  target: `flat`, `smooth` or `free`.  through: FREE or
@@ -100,7 +95,7 @@ def fit_jointly(
         camera, observations.poses_of(flat.camera_from_target), np.zeros((basis.shape[1], SPACE)), np.zeros((len(points), SPACE))
     )
     evidence = first_guess(0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), camera.intrinsics.fx)
-    noise, loss = evidence.noise, Huber(FAR * np.sqrt(evidence.noise))
+    noise, loss = evidence.noise, _loss(evidence.noise)
     steps, settled = 0, False
     for round_ in range(ROUNDS):
         last = settled or round_ == ROUNDS - 1
@@ -108,7 +103,7 @@ def fit_jointly(
         problem = Joint(measurements, points, free, surface=basis, energy=energy, single=target == "free", precisions=precisions)
         options = Options(tolerance=FINE if last else COARSE, max_steps=50)
         if abs(evidence.noise / noise - 1.0) > LOSS_KEEPS:
-            noise, loss = evidence.noise, Huber(FAR * np.sqrt(evidence.noise))
+            noise, loss = evidence.noise, _loss(evidence.noise)
         solution = solve(problem, estimate, loss=loss, options=options)
         estimate, steps = solution.unknowns, steps + solution.steps
         known = problem.known(solution.sums)
@@ -118,6 +113,11 @@ def fit_jointly(
         settled = renewed.agrees_with(evidence)
         evidence = renewed
     raise AssertionError("the last round returns")
+
+
+def _loss(noise: float) -> Huber:
+    """noise: px^2 of a coordinate."""
+    return Huber(FAR * float(np.sqrt(noise)))
 
 
 def _with_displacement(camera: Camera) -> Camera:
