@@ -48,10 +48,10 @@ if TYPE_CHECKING:
     from orthoscope.simulation.scene import simulate_detections as simulate_detections
     from orthoscope.straight.undistort import undistort as undistort
     from orthoscope.targets.detections import Detections as Detections
-    from orthoscope.targets.detections import Target as Target
     from orthoscope.targets.detections import View as View
-    from orthoscope.targets.detections import chessboard as chessboard
-    from orthoscope.targets.detections import parse_target as parse_target
+    from orthoscope.targets.table import parse_target as parse_target
+    from orthoscope.targets.target import Target as Target
+    from orthoscope.targets.target import chessboard as chessboard
 
 ROOMS = {
     "evaluation.comparison.compare": ("Comparison", "compare"),
@@ -62,7 +62,9 @@ ROOMS = {
     "simulation.scene": ("Scene", "simulate_detections"),
     "geometry.arrays": ("CalibrationError", "InputError"),
     "geometry.pose": ("Pose",),
-    "targets.detections": ("Detections", "Target", "View", "chessboard", "parse_target"),
+    "targets.detections": ("Detections", "View"),
+    "targets.target": ("Target", "chessboard"),
+    "targets.table": ("parse_target",),
     "detection.detect": ("detect",),
     "formats.export": ("export",),
     "files.images": ("read_image", "write_image"),
