@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
-from orthoscope.models.chunks import in_blocks
+from orthoscope.models.chunks import in_chunks
 from orthoscope.models.lens import Lens
 from orthoscope.models.opencv_order import opencv_distortion
 from orthoscope.models.smooth_map import smooth_map
@@ -163,7 +163,7 @@ class Camera:
     def _rays(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Unit rays of pixels."""
         frame = self.lens_frame or self.intrinsics
-        rays = in_blocks(
+        rays = in_chunks(
             lambda u, v: self.lens.chart.lift(*self.lens.unwarp(*frame.place(u, v))), pixels, width=3
         )
         if self.lens_frame is None:
@@ -195,7 +195,7 @@ class Camera:
         def straighten(u, v):
             return np.stack(seen.pixel(*self.lens.chart.flat(*self.lens.unwarp(*frame.place(u, v)))), axis=-1)
 
-        return in_blocks(straighten, pixels, width=2)
+        return in_chunks(straighten, pixels, width=2)
 
     def distort_pixels(
         self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None
