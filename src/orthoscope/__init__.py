@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from orthoscope.formats.export import export as export
     from orthoscope.formats.own.json import load as load
     from orthoscope.formats.own.json import load_camera as load_camera
+    from orthoscope.formats.own.json import load_evaluation as load_evaluation
     from orthoscope.formats.own.json import save as save
     from orthoscope.geometry.arrays import CalibrationError as CalibrationError
     from orthoscope.geometry.arrays import InputError as InputError
@@ -66,7 +67,7 @@ ROOMS = {
     "detection.detect": ("detect",),
     "formats.export": ("export",),
     "files.images": ("read_image", "write_image"),
-    "formats.own.json": ("load", "load_camera", "save"),
+    "formats.own.json": ("load", "load_camera", "load_evaluation", "save"),
     "straight.undistort": ("undistort",),
     "methods": ("METHODS", "calibrate"),
     "fitting.calibration": ("Calibration",),

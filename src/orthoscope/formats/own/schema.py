@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
+from orthoscope.formats.own.struct import FileStruct
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera, Intrinsics
@@ -31,11 +31,7 @@ __all__ = ["CalibrationFile", "CameraFile", "DetectionsFile", "SceneFile"]
 Row = list[float]
 
 
-class _Struct(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """An object of a file; a field that has its default is left out."""
-
-
-class TargetFile(_Struct, kw_only=True):
+class TargetFile(FileStruct, kw_only=True):
     name: str
     grid: tuple[int, int] | None = None
     points: list[tuple[float, float, float]]
@@ -53,7 +49,7 @@ class TargetFile(_Struct, kw_only=True):
         )
 
 
-class ViewFile(_Struct):
+class ViewFile(FileStruct):
     image: str
     corners: list[tuple[int, float, float]]
 
@@ -66,7 +62,7 @@ class ViewFile(_Struct):
         return View(self.image, np.array(ids, dtype=np.int64), np.array(pixels, dtype=float).T)
 
 
-class DetectionsFile(_Struct):
+class DetectionsFile(FileStruct):
     image_size: tuple[int, int]
     target: TargetFile
     views: list[ViewFile]
@@ -92,7 +88,7 @@ class DetectionsFile(_Struct):
         return Detections(self.target.core(), self.image_size, views, aside, outliers)
 
 
-class IntrinsicsFile(_Struct, omit_defaults=False):
+class IntrinsicsFile(FileStruct, omit_defaults=False):
     fx: float
     fy: float
     cx: float
@@ -103,7 +99,7 @@ class IntrinsicsFile(_Struct, omit_defaults=False):
         return Intrinsics(self.fx, self.fy, self.cx, self.cy, self.skew)
 
 
-class DisplacementFile(_Struct):
+class DisplacementFile(FileStruct):
     origin: Row
     step: Row
     shape: tuple[int, int]
@@ -124,7 +120,7 @@ class DisplacementFile(_Struct):
         )
 
 
-class LensFile(_Struct):
+class LensFile(FileStruct):
     """A formula of LENSES; with a displacement `over` it, a free lens."""
 
     name: str
@@ -154,7 +150,7 @@ class LensFile(_Struct):
         return FreeLens(formula, self.over.core()) if self.over else formula
 
 
-class CameraFile(_Struct):
+class CameraFile(FileStruct):
     image_size: tuple[int, int]
     intrinsics: IntrinsicsFile
     lens: LensFile
@@ -176,7 +172,7 @@ class CameraFile(_Struct):
         )
 
 
-class PoseFile(_Struct):
+class PoseFile(FileStruct):
     rotation: tuple[Row, Row, Row]
     translation: Row
 
@@ -188,7 +184,7 @@ class PoseFile(_Struct):
         return Pose(_array(self.rotation), _array(self.translation))
 
 
-class UncertaintyFile(_Struct):
+class UncertaintyFile(FileStruct):
     names: list[str]
     covariance: list[Row]
 
@@ -206,7 +202,7 @@ class UncertaintyFile(_Struct):
         return Uncertainty(tuple(self.names), _array(self.covariance))
 
 
-class TargetShapeFile(_Struct):
+class TargetShapeFile(FileStruct):
     kind: str
     displacements: list[Row]
 
@@ -218,7 +214,7 @@ class TargetShapeFile(_Struct):
         return TargetShape(self.kind, _array(self.displacements).reshape(-1, 3))
 
 
-class CalibrationFile(_Struct, kw_only=True):
+class CalibrationFile(FileStruct, kw_only=True):
     version: str
     camera: CameraFile
     uncertainty: UncertaintyFile
@@ -276,7 +272,7 @@ class CalibrationFile(_Struct, kw_only=True):
         )
 
 
-class SceneFile(_Struct):
+class SceneFile(FileStruct):
     camera: CameraFile
     target: TargetFile
     camera_from_target: list[PoseFile]
