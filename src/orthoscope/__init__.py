@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from orthoscope.formats.own.json import load_calibration as load_calibration
     from orthoscope.formats.own.json import load_camera as load_camera
     from orthoscope.formats.own.json import load_detections as load_detections
+    from orthoscope.formats.own.json import load_evaluation as load_evaluation
     from orthoscope.formats.own.json import save as save
     from orthoscope.geometry.arrays import CalibrationError as CalibrationError
     from orthoscope.geometry.arrays import InputError as InputError
@@ -73,7 +74,14 @@ ROOMS = {
     "fitting.held_out": ("held_out",),
     "fitting.resection": ("resect",),
     "formats.export": ("export",),
-    "formats.own.json": ("load", "load_calibration", "load_camera", "load_detections", "save"),
+    "formats.own.json": (
+        "load",
+        "load_calibration",
+        "load_camera",
+        "load_detections",
+        "load_evaluation",
+        "save",
+    ),
     "geometry.arrays": ("CalibrationError", "InputError"),
     "geometry.pose": ("Pose",),
     "methods": ("METHODS", "calibrate"),
