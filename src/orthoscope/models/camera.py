@@ -8,6 +8,7 @@ centre.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,8 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.models.chunks import in_blocks
 from orthoscope.models.lens import Lens
+from orthoscope.models.parameters import Parameters
+from orthoscope.models.pixel_slopes import PixelSlopes
 from orthoscope.models.smooth_map import smooth_map
 
 __all__ = ["WIDEST", "Camera", "Intrinsics", "image_border"]
@@ -110,6 +113,15 @@ class Camera:
         return (self.lens_frame or self.intrinsics).to_pixels(
             self.lens.distort(self._lens_rays(points), beyond=beyond)
         )
+
+    def linearise(self, points: Iterable[ndarray], free: Parameters | Iterable[str] = ()) -> PixelSlopes:
+        """Pixels of points and their slopes by point and parameter; the formula goes on beyond its domain.
+
+        Args:
+            points: X, Y and Z in the camera frame, arrays of one shape, any unit.
+            free: parameters whose slopes are wanted, as models/parameters.py names them.
+        """
+        return PixelSlopes(self, points, Parameters.of(free))
 
     def unproject(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Unit rays (n,3), camera frame, that fall on pixels (n,2); NaN where none does."""
