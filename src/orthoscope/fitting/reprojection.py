@@ -1,9 +1,9 @@
 """The reprojection problem: how pixels move with the camera and with the pose of each view.
 
-e = projected minus detected, of corner p in view j:  q = R_j p,  P = q + t_j, the camera's image of P
-(models/pixel_slopes.py has its slopes).  With g = d/dP:  d/dt = g and, for a rotation step on the left, d/dw = q x
-g. Each chunk of views becomes one stacked array (view, column, 2 n) whose Gram matrix holds all sums that the
-solver wants.
+e = projected minus detected, of corner p in view j: q = R_j p, P = q + t_j, the camera's image of P
+(models/pixel_slopes.py has its slopes). With g = d/dP: d/dt = g and, for a rotation step on the left, d/dw =
+q x g. Each chunk of views becomes one stacked array (view, column, 2 n) whose Gram matrix holds all sums that
+the solver wants.
 """
 
 from __future__ import annotations

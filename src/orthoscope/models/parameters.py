@@ -1,10 +1,10 @@
 """Parameters of a camera that may move: their names, their ties, their values, the camera after a step.
 
-A camera has K's `fx`, `fy`, `cx`, `cy`, `skew`; its lens's coefficients by their own names; and, where the lens
-has a frame of its own, the frame's `centre_x`, `centre_y`, `frame_fx`, `frame_fy`, with `frame_scale` for the two
-last together. Names joined by `=` are tied: they take the same steps, so `fx=fy` keeps pixels square and
-`fx=frame_scale` lets the unit of the lens's radius follow the focal length. In a rig a camera's name comes first,
-`left:fx=fy`.
+A camera has K's `fx`, `fy`, `cx`, `cy`, `skew`; its lens's coefficients by their own names; and, where the
+lens has a frame of its own, the frame's `centre_x`, `centre_y`, `frame_fx`, `frame_fy`, with `frame_scale`
+for the two last together. Names joined by `=` are tied: they take the same steps, so `fx=fy` keeps pixels
+square and `fx=frame_scale` lets the unit of the lens's radius follow the focal length. In a rig a camera's
+name comes first, `left:fx=fy`.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ class Parameters:
         for name in self.singles:
             if name not in known:
                 raise InputError(
-                    f"parameter {name!r} of this camera cannot be estimated; expected some of {', '.join(known)}."
+                    f"parameter {name!r} of this camera cannot be estimated; expected some of"
+                    f" {', '.join(known)}."
                 )
             if self.singles.count(name) > 1:
                 raise InputError(

@@ -1,10 +1,11 @@
 """The image of points and how it moves: with the point, with K, with the lens, with the lens's frame.
 
-P is a point in the camera frame, P' = M P the ray as the lens meets it, (x, y) = chart(P'), (x_d, y_d) = lens(x, y)
-and (u, v) = L (x_d, y_d, 1). L is K and M the identity, unless the lens has a frame of its own: then L is the frame
-and M = L^-1 K. Derivatives run backwards: a covector of the distorted plane through the lens's Jacobian and the
-chart to d/dP', and M^T takes it to d/dP. An entry (a, b) of L moves component a of the pixel by (x_d, y_d, 1)_b; in
-a frame of its own it also moves P' by -L^-1 e_a P'_b, and the same entry of K then moves P' by L^-1 e_a P_b.
+P is a point in the camera frame, P' = M P the ray as the lens meets it, (x, y) = chart(P'), (x_d, y_d) =
+lens(x, y) and (u, v) = L (x_d, y_d, 1). L is K and M the identity, unless the lens has a frame of its own:
+then L is the frame and M = L^-1 K. Derivatives run backwards: a covector of the distorted plane through the
+lens's Jacobian and the chart to d/dP', and M^T takes it to d/dP. An entry (a, b) of L moves component a of
+the pixel by (x_d, y_d, 1)_b; in a frame of its own it also moves P' by -L^-1 e_a P'_b, and the same entry of
+K then moves P' by L^-1 e_a P_b.
 """
 
 from __future__ import annotations
@@ -113,6 +114,13 @@ class PixelSlopes:
     def _by_turn(self, entry: str, moving: tuple[ndarray, ...]) -> tuple[ndarray, ndarray]:
         """By P' as it moves along L^-1 e_a times a coordinate."""
         row, column = ENTRIES[entry]
-        along, by_ray = np.linalg.inv(self._frame.matrix)[:, row], self.by_ray
-        u, v = (sum(g * part for g, part in zip(of, along, strict=True) if part) for of in by_ray)
+        u, v = self._by_row[row]
         return u * moving[column], v * moving[column]
+
+    @cached_property
+    def _by_row(self) -> list[tuple[ndarray, ndarray]]:
+        """d(u, v) by P' along L^-1 e_1 and along L^-1 e_2."""
+        L, ((u_x, u_y, _), (v_x, v_y, _)) = self._frame, self.by_ray
+        first = u_x / L.fx, v_x / L.fx
+        across = L.skew / (L.fx * L.fy)
+        return [first, (u_y / L.fy - u_x * across, v_y / L.fy - v_x * across)]

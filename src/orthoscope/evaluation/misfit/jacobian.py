@@ -1,9 +1,10 @@
 """How the residuals of a calibration move with everything that may explain them: camera, poses, places of the
 target's corners.
 
-e = projected minus detected of corner p in view j. q = R_j p, P = q + t_j in the camera frame. With J = de/dP, which
-the camera says of itself (models/pixel_slopes.py):  d/dd = J R_j for a displacement d of the corner in the target
-frame, d/dt = J, and d/dw = J [w x q'] for a turn about the middle of what the view shows, q' from there.
+e = projected minus detected of corner p in view j. q = R_j p, P = q + t_j in the camera frame. With J =
+de/dP, which the camera says of itself (models/pixel_slopes.py): d/dd = J R_j for a displacement d of the
+corner in the target frame, d/dt = J, and d/dw = J [w x q'] for a turn about the middle of what the view
+shows, q' from there.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def slopes_of(calibration: Calibration) -> Slopes:
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         image = calibration.camera.linearise(points, parameters_of(calibration))
         projected, by_camera = np.stack([image.u, image.v]), image.by_parameters()
-        by_point = np.array(image.by_point).transpose(1, 0, 2)  # (3, 2, n)
+        by_point = np.stack([np.stack(by) for by in zip(*image.by_point, strict=True)])  # (3, 2, n)
         q = _from_their_middle(turned, view, len(views))
         by_turn = [q[i - 2] * by_point[i - 1] - q[i - 1] * by_point[i - 2] for i in range(3)]
         by_place = (rotation[:, :, None] * by_point[:, None]).sum(0)

@@ -147,7 +147,9 @@ class Straightness:
     def _curve(
         self, unknowns: LinesOfSight, parameters: Parameters = NOTHING
     ) -> tuple[Float[ndarray, "2 n"], Float[ndarray, "2 n"], Float[ndarray, "2 n"], Float[ndarray, "k 2 n"]]:
-        """Pixels of the feet, their slopes along the curve, when P moves along the line's normal, by parameters."""
+        """Pixels of the feet, their slopes along the curve, when P moves along the line's normal, by the
+        parameters.
+        """
         direction, onward, normal = self._directions(unknowns)
         image = unknowns.camera.linearise(direction, parameters)
         along, across = (
