@@ -159,63 +159,7 @@ def _squared(residual: ndarray, chunk: Chunk) -> ndarray:
     return residual[:, :n] ** 2 + residual[:, n:] ** 2
 
 
-<<<<<<< HEAD
 def _set_pose(columns: ndarray, g: Covector, q: list[ndarray]) -> None:
-=======
-def _pixels(at: Warp, frame: Intrinsics) -> tuple[ndarray, ndarray]:
-    """u and v of distorted places."""
-    u = frame.fx * at.x + frame.cx
-    return u + frame.skew * at.y if frame.skew else u, frame.fy * at.y + frame.cy
-
-
-def _pixels_by_place(at: Warp, frame: Intrinsics) -> tuple[tuple[ndarray, ndarray], tuple[ndarray, ndarray]]:
-    """Derivatives of u, and of v, by the place (x, y) in the lens's chart."""
-    u_x, u_y = frame.fx * at.j_xx, frame.fx * at.j_xy
-    if frame.skew:
-        u_x, u_y = u_x + frame.skew * at.j_yx, u_y + frame.skew * at.j_yy
-    return (u_x, u_y), (frame.fy * at.j_yx, frame.fy * at.j_yy)
-
-
-def _set_parameter(
-    u: ndarray,
-    v: ndarray,
-    group: str,
-    at: Warp,
-    frame: Intrinsics,
-    by_lens: dict[str, tuple[ndarray, ndarray]],
-) -> None:
-    """Writes d(u, v) by a parameter, or by those tied in a group, into the two halves of a column."""
-    first, *others = (_slopes(name, at, frame, by_lens) for name in group.split("="))
-    u[...], v[...] = first
-    for by_u, by_v in others:
-        u += by_u
-        v += by_v
-
-
-def _slopes(
-    name: str, at: Warp, frame: Intrinsics, by_lens: dict[str, tuple[ndarray, ndarray]]
-) -> tuple[ndarray | float, ndarray | float]:
-    """d(u, v) by one parameter, numbers where it is the same everywhere."""
-    match name:
-        case "fx":
-            return at.x, 0.0
-        case "fy":
-            return 0.0, at.y
-        case "cx":
-            return 1.0, 0.0
-        case "cy":
-            return 0.0, 1.0
-        case "skew":
-            return at.y, 0.0
-    x, y = by_lens[name]
-    along = frame.fx * x
-    return along + frame.skew * y if frame.skew else along, frame.fy * y
-
-
-def _set_pose(
-    columns: ndarray, g: tuple[ndarray, ndarray, ndarray], q: list[ndarray], turn: ndarray | None
-) -> None:
->>>>>>> main
     """Writes d/dw and d/dt into six columns (views, 6, n), from g = d/dP."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
