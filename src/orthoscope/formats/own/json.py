@@ -23,7 +23,7 @@ from orthoscope.models.camera import Camera
 from orthoscope.simulation.scene import Scene
 from orthoscope.targets.detections import Detections
 
-__all__ = ["load", "load_calibration", "load_camera", "load_detections", "save"]
+__all__ = ["camera_in", "load", "load_calibration", "load_camera", "load_detections", "save", "written"]
 
 FORMAT = 1
 KINDS: dict[str, tuple[type, Any]] = {  # what a file says it is: the type in memory, the schema on disk
@@ -53,6 +53,14 @@ def save(thing: Detections | Calibration | Camera | Scene, path: str | Path) -> 
 
     Raises InputError where the place cannot be written or a setting has no plain value.
     """
+    write_text(path, written(thing, path))
+
+
+def written(thing: Detections | Calibration | Camera | Scene, path: str | Path) -> str:
+    """The text of a file of our own for `path`.
+
+    Raises InputError where the thing is none that can be saved or a setting has no plain value.
+    """
     for kind, (core, schema) in KINDS.items():
         if isinstance(thing, core):
             try:
@@ -64,7 +72,7 @@ def save(thing: Detections | Calibration | Camera | Scene, path: str | Path) -> 
                     f"the {kind} for {path} cannot be written as JSON ({error}); expected plain, finite"
                     " values."
                 ) from error
-            return write_text(path, text + "\n")
+            return text + "\n"
     raise InputError(f"{type(thing).__name__} cannot be saved; expected one of {', '.join(KINDS)}.")
 
 
@@ -74,11 +82,16 @@ def load(path: str | Path) -> Detections | Calibration | Camera | Scene:
     Raises InputError for a file that is missing, cut off, of another program or of a newer version, and for
     values that cannot be.
     """
-    content = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
+    return _loaded(read_bytes(path), path)
+
+
+def _loaded(content: bytes, path: str | Path) -> Detections | Calibration | Camera | Scene:
+    """What the bytes of a file of ours hold; errors as `load`."""
+    content = content.removeprefix(b"\xef\xbb\xbf")
     kind = _kind(content, path)
     try:
         return msgspec.json.decode(content, type=DOCUMENTS[kind]).core()
-    except (msgspec.ValidationError, InputError) as error:
+    except (msgspec.ValidationError, InputError, OverflowError) as error:
         what = str(error).rstrip(".")
         raise InputError(
             f"{path} does not hold proper {kind} data: {what}. Mend that place or write the file again."
@@ -98,7 +111,12 @@ def load_calibration(path: str | Path) -> Calibration:
 
 def load_camera(path: str | Path) -> Camera:
     """The camera of a file, also out of a calibration or a scene; errors as `load`."""
-    thing = load(path)
+    return camera_in(read_bytes(path), path)
+
+
+def camera_in(content: bytes, path: str | Path) -> Camera:
+    """The camera in the bytes of a file of ours; errors as `load`."""
+    thing = _loaded(content, path)
     return _expect(Camera, thing.camera if isinstance(thing, Calibration | Scene) else thing, path)
 
 
@@ -121,6 +139,8 @@ def _kind(content: bytes, path: str | Path) -> str:
         header = msgspec.json.decode(content, type=_Header)
     except msgspec.ValidationError as error:
         raise InputError(_foreign(path)) from error
+    except RecursionError as error:
+        raise InputError(f"{path} nests without end; expected a file that orthoscope wrote.") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise InputError(_malformed(content, path, error)) from error
     if header.format > FORMAT:
