@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from orthoscope.cli import options
@@ -17,6 +15,7 @@ Examples:
   views      5 used; 270 corners
   rms        0.158 px per point, camera fixed, poses fitted
   NCE        0.357 (1 is what rounding to whole pixels would give)
+  $ orthoscope evaluate camera_info.yaml --on photos/ --target chessboard:9x6:25mm
 
 \b
 Other photographs show the calibration's own board, whose estimated shape is used;
@@ -25,7 +24,7 @@ with --target they show that one, taken as it is said to be.
 
 
 @click.command(epilog=EXAMPLE)
-@options.calibration_file
+@click.argument("calibration", metavar="CAMERA")
 @click.option(
     "--on",
     "others",
@@ -40,7 +39,7 @@ with --target they show that one, taken as it is said to be.
 @options.cluster
 @options.as_json
 def evaluate(
-    calibration: Path,
+    calibration: str,
     others: tuple[str, ...],
     target: str | None,
     image_size: tuple[int, int] | None,
@@ -56,10 +55,18 @@ def evaluate(
     from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
     from orthoscope.evaluation.evaluate import evaluate as judge
     from orthoscope.evaluation.evaluate import evaluate_on
-    from orthoscope.formats.own.json import load_calibration
+    from orthoscope.fitting.calibration import Calibration
+    from orthoscope.formats.load import load_source
+    from orthoscope.geometry.arrays import InputError
 
-    loaded = load_calibration(calibration)
+    loaded = load_source(calibration, image_size=image_size)
+    if not isinstance(loaded, Calibration) and not (others and target):
+        raise InputError(
+            f"{calibration} is a camera without the photographs that it was made from; expected photographs and"
+            " their target: --on PHOTOS --target chessboard:9x6:25mm."
+        )
     if not others:
+        assert isinstance(loaded, Calibration), "a camera alone was refused above"
         with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
             evaluation = judge(loaded, folds=folds, executor=executor, progress=progress)
         click.echo(
@@ -67,11 +74,13 @@ def evaluate(
         )
         return
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
-        board = target or loaded.detections.target
+        board = target or loaded.detections.target  # type: ignore[union-attr]  # a calibration, as checked above
         detections, _ = detections_from(
             others, board, image_size=image_size, executor=executor, progress=progress
         )
-    shape = None if target else loaded.target_shape  # another board has another shape
+    shape = (
+        loaded.target_shape if isinstance(loaded, Calibration) and not target else None
+    )  # another board has another shape
     test = evaluate_on(loaded.camera, detections, shape=shape)
     if as_json:
         rejected = [{"name": entry.image, "reason": entry.reason} for entry in test.detections.set_aside]

@@ -47,7 +47,9 @@ class _WithTools(click.Command):
 
 @click.command(cls=_WithTools, epilog=EXPORT_EXAMPLE)
 @click.argument("calibration", metavar="CAMERA")
-@click.option("--to", "tool", required=True, type=options.TOOL, help="The tool that is to read it; see below.")
+@click.option(
+    "--to", "tool", required=True, type=options.TOOL, help="The tool that is to read it; see below."
+)
 @click.option(
     "-o",
     "--out",
@@ -66,7 +68,9 @@ def export(calibration: str, tool: str, out: Path | None, **settings: Any) -> No
 @click.command(cls=_WithTools, epilog=CONVERT_EXAMPLE)
 @click.argument("source", metavar="IN")
 @click.argument("out", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT")
-@click.option("--to", "tool", required=True, type=options.TOOL, help="The tool that is to read it; see below.")
+@click.option(
+    "--to", "tool", required=True, type=options.TOOL, help="The tool that is to read it; see below."
+)
 @click.option("--image-size", type=options.SIZE, help="Size of the photographs, where IN does not say it.")
 @options.another_size
 @options.tool_settings

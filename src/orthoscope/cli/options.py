@@ -14,8 +14,8 @@ __all__ = [
     "another_size",
     "as_json",
     "calibration_file",
-    "camera_file",
     "camera_at_another_size",
+    "camera_file",
     "cluster",
     "folds",
     "image_size",
@@ -79,10 +79,14 @@ class _Crop(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         found = re.fullmatch(r"(\d{1,7})x(\d{1,7})\+(\d{1,7})\+(\d{1,7})", str(value))
         if isinstance(value, tuple) or not found:
-            return value if isinstance(value, tuple) else self.fail(
-                f"{value!r} is no part of an image; expected WIDTHxHEIGHT+LEFT+TOP, such as 640x480+320+240.",
-                param,
-                ctx,
+            return (
+                value
+                if isinstance(value, tuple)
+                else self.fail(
+                    f"{value!r} is no part of an image; expected WIDTHxHEIGHT+LEFT+TOP, such as 640x480+320+240.",
+                    param,
+                    ctx,
+                )
             )
         width, height, left, top = (int(part) for part in found.groups())
         return left, top, (width, height)
@@ -97,15 +101,21 @@ def another_size(verb: Callable[..., Any]) -> Callable[..., Any]:
         "--resize", type=_Size(), help="The same camera for photographs scaled to this size."
     )
     binning = click.option(
-        "--binning", type=click.IntRange(1), help="The same camera where blocks of N x N pixels are read as one."
+        "--binning",
+        type=click.IntRange(1),
+        help="The same camera where blocks of N x N pixels are read as one.",
     )
     crop = click.option(
-        "--crop", type=_Crop(), help="The same camera for a part of its photographs: its size, its first pixel."
+        "--crop",
+        type=_Crop(),
+        help="The same camera for a part of its photographs: its size, its first pixel.",
     )
     return crop(binning(resize(verb)))
 
 
-def camera_at_another_size(camera: Any, crop: Any, binning: int | None, resize: tuple[int, int] | None) -> Any:
+def camera_at_another_size(
+    camera: Any, crop: Any, binning: int | None, resize: tuple[int, int] | None
+) -> Any:
     """The camera cropped, binned and resized as `another_size` was told."""
     camera = camera.cropped(*crop) if crop else camera
     camera = camera.binned(binning) if binning else camera

@@ -7,7 +7,8 @@ happens before that (a full disk, Ctrl-C) leaves the place as it was. Folders ar
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from orthoscope.geometry.arrays import InputError
@@ -25,7 +26,7 @@ __all__ = [
     "write_text",
 ]
 
-# Files that this process was given to read: device and number of each. `write_bytes` replaces none of them.
+# Files that are being read: device and number of each. `write_bytes` replaces none of them.
 _INPUTS: set[tuple[int, int]] = set()
 
 
@@ -68,8 +69,8 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
     Raises InputError where the place cannot be written.
     """
-    place = Path(os.path.realpath(path))
     try:
+        place = Path(os.path.realpath(path))
         if _identity(place) in _INPUTS and place.read_bytes() != content:
             raise InputError(_onto(path))
         if place.is_dir():
@@ -98,11 +99,14 @@ def check_folder(folder: str | Path) -> None:
         while not place.exists():
             place = place.parent
     except (OSError, ValueError) as error:
-        raise InputError(f"{_shown(folder)} cannot be written ({_reason(error)}); choose another place.") from error
+        raise InputError(
+            f"{_shown(folder)} cannot be written ({_reason(error)}); choose another place."
+        ) from error
     longest = max(map(len, (os.fsencode(part) for part in Path(folder).parts)), default=0)
     if longest > LONGEST_NAME:
         raise InputError(
-            f"{_shown(folder)} cannot be written (a name of {longest} bytes); expected at most {LONGEST_NAME}."
+            f"{_shown(folder)} cannot be written (a name of {longest} bytes); expected at most"
+            f" {LONGEST_NAME}."
         )
     if not place.is_dir():
         raise InputError(f"{place} is a file; expected a folder to write into. Choose another place.")
@@ -110,12 +114,21 @@ def check_folder(folder: str | Path) -> None:
         raise InputError(f"{place} may not be written; choose another place or change its permissions.")
 
 
-def keep_inputs(paths: Iterable[str | Path]) -> None:
-    """From now on `write_bytes` replaces none of these files, by whatever name, unless by the same bytes.
+@contextmanager
+def keep_inputs(paths: Iterable[str | Path]) -> Iterator[None]:
+    """Within this block `write_bytes` replaces none of these files, by whatever name, unless by the same
+    bytes.
 
-    The command line says this of all that it is given to read; a program that saves what it has loaded is free to.
+    The command line says this of all that it is given to read; a program that saves what it has loaded is
+    free to.
     """
+    before = set(_INPUTS)
     _INPUTS.update(identity for path in paths if (identity := _identity(Path(path))))
+    try:
+        yield
+    finally:
+        _INPUTS.clear()
+        _INPUTS.update(before)
 
 
 def check_not_onto(places: Iterable[str | Path], inputs: Iterable[str | Path]) -> None:
@@ -139,7 +152,9 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 
 def _onto(path: str | Path) -> str:
-    return f"{path} is one of the files that are read; what is read is never written onto. Choose another place."
+    return (
+        f"{path} is one of the files that are read; what is read is never written onto. Choose another place."
+    )
 
 
 def _replace(place: Path, content: bytes) -> None:

@@ -1,7 +1,7 @@
 """basalt's calibration (JSON of cereal): cameras by number, kb4, pinhole and pinhole-radtan8.
 
-The file holds the inertial sensor too; what is not known of it is written as basalt's defaults, for a camera that
-stands in the sensor's frame.
+The file holds the inertial sensor too; what is not known of it is written as basalt's defaults, for a camera
+that stands in the sensor's frame.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from orthoscope.formats.opencv import OPENCV_ORDER
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, number, numbers, whole_number
 from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.opencv_order import OPENCV_ORDER
 
 __all__ = ["BASALT"]
 
@@ -23,7 +23,9 @@ FOCAL = ("fx", "fy", "cx", "cy")
 
 def _recognises(document: Document) -> bool:
     table = document.json
-    return isinstance(table, dict) and isinstance(table.get("value0"), dict) and "intrinsics" in table["value0"]
+    return (
+        isinstance(table, dict) and isinstance(table.get("value0"), dict) and "intrinsics" in table["value0"]
+    )
 
 
 def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str, Contents]:
@@ -90,6 +92,7 @@ BASALT = Format(
     recognises=_recognises,
     read=_read,
     write=_write,
-    remarks="The inertial sensor's numbers are basalt's defaults, the camera stands in its frame; ds, ucm and eucm are"
+    remarks="The inertial sensor's numbers are basalt's defaults, the camera stands in its frame; ds, ucm"
+    " and eucm are"
     " not read.",
 )

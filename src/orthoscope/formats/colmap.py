@@ -1,8 +1,8 @@
 """COLMAP's sparse model: cameras.txt or cameras.bin, with images.txt or images.bin for the poses.
 
-COLMAP calls the centre of the first pixel (0.5, 0.5). A pose is camera from world, as a quaternion (w first) and a
-translation; the world is the target's frame. Poses go along where the file is named cameras.txt or cameras.bin, as
-COLMAP wants it; an empty points3D file then completes the model.
+COLMAP calls the centre of the first pixel (0.5, 0.5). A pose is camera from world, as a quaternion (w first)
+and a translation; the world is the target's frame. Poses go along where the file is named cameras.txt or
+cameras.bin, as COLMAP wants it; an empty points3D file then completes the model.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ def _recognises(document: Document) -> bool:
 
 def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str, Contents]:
     rows = _rows(document)
-    entries = [(row[0], row[1], row[2:4], row[4:]) for row in rows] if rows else _binary_cameras(document) or []
+    entries = (
+        [(row[0], row[1], row[2:4], row[4:]) for row in rows] if rows else _binary_cameras(document) or []
+    )
     poses = _poses(document)
     cameras = {}
     for key, model, sides, values in entries:
@@ -77,7 +79,9 @@ def _rows(document: Document) -> list[list[str]]:
     if text is None or "\0" in text:
         return []
     rows = [line.split() for line in text.split("\n") if line.strip() and not line.lstrip().startswith("#")]
-    return rows if rows and all(len(row) > 4 and row[0].isdigit() and row[1] in MODELS for row in rows) else []
+    return (
+        rows if rows and all(len(row) > 4 and row[0].isdigit() and row[1] in MODELS for row in rows) else []
+    )
 
 
 def _binary_cameras(document: Document) -> list[tuple[int, str, tuple[int, int], list[float]]] | None:
@@ -96,7 +100,9 @@ def _binary_cameras(document: Document) -> list[tuple[int, str, tuple[int, int],
         length = MODELS[NAMES[number]][1] + 2 + MODELS[NAMES[number]][2]
         if len(content) < place + 8 * length:
             return None
-        cameras.append((key, NAMES[number], (width, height), list(struct.unpack_from(f"<{length}d", content, place))))
+        cameras.append(
+            (key, NAMES[number], (width, height), list(struct.unpack_from(f"<{length}d", content, place)))
+        )
         place += 8 * length
     return cameras if place == len(content) else None
 
@@ -153,7 +159,9 @@ def _write(contents: Contents, place: Path) -> Files:
     values = [fx, fy, cx, cy, *holding.values(camera.lens)]
     binary = place.suffix.lower() == ".bin"
     files: dict[Path, str | bytes] = {
-        place: _camera_bytes(camera, holding.word, values) if binary else _camera_text(camera, holding.word, values)
+        place: _camera_bytes(camera, holding.word, values)
+        if binary
+        else _camera_text(camera, holding.word, values)
     }
     if contents.poses and place.stem == "cameras":
         files[place.with_name("images" + place.suffix)] = (
@@ -213,5 +221,6 @@ COLMAP = Format(
     write=_write,
     pixel_origin=0.5,
     poses=True,
-    remarks="Poses go along where the file is named cameras.txt or cameras.bin; of images and points nothing is read.",
+    remarks="Poses go along where the file is named cameras.txt or cameras.bin; of images and points nothing"
+    " is read.",
 )

@@ -1,8 +1,9 @@
-"""A camera to the file of another tool: exactly where the tool can hold it, else the nearest that it can hold.
+"""A camera to the file of another tool: exactly where the tool can hold it, else the nearest that it can
+hold.
 
-Nearest is by least squares in pixels over the rays of the corners that the camera was made from (over the frame where
-only the camera is known), K and the coefficients free, the orientation fixed, so that poses stay what they are. What
-that costs is said, and above LIMIT_PX nothing is written unless one insists.
+Nearest is by least squares in pixels over the rays of the corners that the camera was made from (over the
+frame where only the camera is known), K and the coefficients free, the orientation fixed, so that poses stay
+what they are. What that costs is said, and above LIMIT_PX nothing is written unless one insists.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ class Exportable(NamedTuple):
         farthest_px: distance at most.
         where: of which pixels that is said, in words.
         lacks: what of the camera the tool cannot hold; empty where it is held exactly.
-        beyond: share of the frame's pixels with rays so far from the axis that the tool has no image for them.
+        beyond: share of the frame's pixels with rays so far from the axis that the tool has no image for
+            them.
     """
 
     camera: Camera
@@ -94,8 +96,8 @@ def export(
     """Writes a camera for another tool, and what it costs where the tool cannot hold it exactly.
 
     Args:
-        source: a calibration is better than its camera: its corners say where the camera is known, its poses go
-            along where the tool takes them.
+        source: a calibration is better than its camera: its corners say where the camera is known, its poses
+            go along where the tool takes them.
         path: of the file; where the tool has several kinds, its suffix says which.
         tool: a name in FORMATS, such as `opencv`.
         name: of the camera, where the tool names cameras.
@@ -110,8 +112,10 @@ def export(
     held = exportable(camera, tool, made_from=made_from)
     if held.apart_px > LIMIT_PX and not anyway:
         raise InputError(
-            f"{tool} cannot hold {held.lacks}: the nearest that it can is {held.apart_px:.2g} px away on average"
-            f" {held.where} ({held.farthest_px:.2g} px at most); expected at most {LIMIT_PX:g} px. Choose another"
+            f"{tool} cannot hold {held.lacks}: the nearest that it can is {held.apart_px:.2g} px away on"
+            f" average"
+            f" {held.where} ({held.farthest_px:.2g} px at most); expected at most {LIMIT_PX:g} px. Choose"
+            f" another"
             " tool, calibrate with a lens that it has, or insist (--anyway)."
         )
     contents = Contents(
@@ -131,8 +135,8 @@ def exportable(camera: Camera, tool: str, *, made_from: Calibration | None = Non
 
     Args:
         tool: a name in FORMATS.
-        made_from: the calibration of the camera; the nearest is then judged where its corners were seen, otherwise
-            over the frame.
+        made_from: the calibration of the camera; the nearest is then judged where its corners were seen,
+            otherwise over the frame.
     Raises:
         InputError: the tool is not known.
         CalibrationError: none of the tool's lenses sees so far from the axis.
@@ -162,9 +166,7 @@ def _nearest(camera: Camera, rays: Float[ndarray, "n 3"], record: Format) -> tup
     if record.skew:
         focal = (*focal, "skew")
     fy = frame.fy if record.two_focals else frame.fx
-    plain = replace(
-        camera, intrinsics=Intrinsics(frame.fx, fy, frame.cx, frame.cy, skew), lens_frame=None
-    )
+    plain = replace(camera, intrinsics=Intrinsics(frame.fx, fy, frame.cx, frame.cy, skew), lens_frame=None)
     near: list[tuple[float, Camera, Holding]] = []
     for text in record.lenses:
         kind, free = parse_lens(text)
@@ -179,7 +181,8 @@ def _nearest(camera: Camera, rays: Float[ndarray, "n 3"], record: Format) -> tup
             near.append((float(apart), other, holding))
     if not near:
         raise CalibrationError(
-            f"none of {', '.join(record.lenses)} sees as far from the axis as this camera does. Use a tool with a"
+            f"none of {', '.join(record.lenses)} sees as far from the axis as this camera does. Use a tool"
+            f" with a"
             " lens of the angle."
         )
     _, other, holding = min(near, key=lambda entry: entry[0])

@@ -11,18 +11,20 @@ from pathlib import Path
 
 import numpy as np
 
-from orthoscope.formats.opencv import OPENCV_ORDER
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.ros import camera_of_matrix
 from orthoscope.formats.syntax import Document, numbers, whole_number
 from orthoscope.models.camera import Camera
+from orthoscope.models.opencv_order import OPENCV_ORDER
 
 __all__ = ["FOXGLOVE"]
 
 
 def _recognises(document: Document) -> bool:
-    return document.xml is None and {"width", "height"} <= document.table.keys() and (
-        {"K", "D"} <= document.table.keys() or {"k", "d"} <= document.table.keys()
+    return (
+        document.xml is None
+        and {"width", "height"} <= document.table.keys()
+        and ({"K", "D"} <= document.table.keys() or {"k", "d"} <= document.table.keys())
     )
 
 

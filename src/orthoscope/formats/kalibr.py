@@ -1,7 +1,8 @@
-"""Kalibr's camchain: YAML with a camera for each of cam0, cam1, ...; the pin-hole with radtan, equidistant or fov.
+"""Kalibr's camchain: YAML with a camera for each of cam0, cam1, ...; the pin-hole with radtan, equidistant or
+fov.
 
-radtan is k1 k2 p1 p2 of OpenCV, equidistant its fisheye, fov one angle. Of a chain each camera is read by its name;
-its transformations between cameras are not.
+radtan is k1 k2 p1 p2 of OpenCV, equidistant its fisheye, fov one angle. Of a chain each camera is read by its
+name; its transformations between cameras are not.
 """
 
 from __future__ import annotations

@@ -1,15 +1,16 @@
 """lensfun's database (XML): a polynomial of the radius that is about one image, not about a focal length.
 
-The radius is measured in halves of the shorter side (between the centres of the first and the last pixel), before
-(r_u) and after (r_d) distortion:
+The radius is measured in halves of the shorter side (between the centres of the first and the last pixel),
+before (r_u) and after (r_d) distortion:
 
     poly3   r_d = r_u (1 - k1 + k1 r_u^2)
     poly5   r_d = r_u (1 + k1 r_u^2 + k2 r_u^4)
     ptlens  r_d = r_u (a r_u^3 + b r_u^2 + c r_u + 1 - a - b - c)
 
 Its straight image keeps the radius 1 where that is (ptlens, poly3), so its focal length F is another than the
-camera's at the centre, f = F (1 - a - b - c); `focal` says F for a frame 36 mm wide. The database does not say how
-large images are, nor that pixels may be oblong. lensfun manual, lens calibration; libs/lensfun/mod-coord.
+camera's at the centre, f = F (1 - a - b - c); `focal` says F for a frame 36 mm wide. The database does not
+say how large images are, nor that pixels may be oblong. lensfun manual, lens calibration;
+libs/lensfun/mod-coord.
 """
 
 from __future__ import annotations
@@ -74,11 +75,17 @@ def _camera(lens: Element, distortion: Element, size: tuple[int, int], document:
     elif word == "ptlens":
         a, b, c = value("a"), value("b"), value("c")
         scale = 1.0 - a - b - c
-        made = Pfet(a2=c * ratio / scale, a3=b * ratio**2 / scale, a4=a * ratio**3 / scale) if scale > 0 else None
+        made = (
+            Pfet(a2=c * ratio / scale, a3=b * ratio**2 / scale, a4=a * ratio**3 / scale)
+            if scale > 0
+            else None
+        )
     else:
         raise document.refuse(f"has a distortion {word[:40]!r}; expected poly3, poly5 or ptlens")
     if made is None:
-        raise document.refuse(f"has a {word} that turns the image inside out; expected coefficients with a sum below 1")
+        raise document.refuse(
+            f"has a {word} that turns the image inside out; expected coefficients with a sum below 1"
+        )
     fx = scale * focal
     return Camera(size, Intrinsics(fx, fx, float(middle[0]), float(middle[1])), made)
 
@@ -87,7 +94,9 @@ def _focal_px(lens: Element, distortion: Element, size: tuple[int, int], documen
     focal = number(distortion.get("real-focal", distortion.get("focal")), "focal", document)
     crop = number(lens.findtext("cropfactor", "1"), "cropfactor", document)
     if not (focal > 0 and crop > 0):
-        raise document.refuse(f"has a focal length of {focal:g} mm and a crop factor of {crop:g}; expected more than 0")
+        raise document.refuse(
+            f"has a focal length of {focal:g} mm and a crop factor of {crop:g}; expected more than 0"
+        )
     return focal * crop * math.hypot(*size) / math.hypot(*FRAME_MM)
 
 

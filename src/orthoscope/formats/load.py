@@ -41,7 +41,8 @@ def load_camera(
 def load_source(
     path: str | Path, *, image_size: tuple[int, int] | None = None
 ) -> Calibration | Scene | Contents:
-    """What `export` takes, with all that the file knows: a calibration or scene of ours, or a camera with poses.
+    """What `export` takes, with all that the file knows: a calibration or scene of ours, or a camera with
+    poses.
 
     Args:
         path, image_size: as for `load_camera`.

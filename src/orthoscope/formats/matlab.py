@@ -1,9 +1,9 @@
 """MATLAB: a .mat file with the fields of cameraParameters, or a .m line that makes cameraIntrinsics.
 
-MATLAB calls the centre of the first pixel (1, 1), knows a skew, and has OpenCV's k1 k2 k3 p1 p2. A .mat is of version
-5: elements of a type, a length and data, padded to 8 bytes; a struct is a matrix whose elements are matrices, and a
-compressed element is zlib's. An object that MATLAB itself saved is closed to others: `toStruct` opens it. Its
-fish-eye is Scaramuzza's, which no lens here is. MAT-File Format, The MathWorks.
+MATLAB calls the centre of the first pixel (1, 1), knows a skew, and has OpenCV's k1 k2 k3 p1 p2. A .mat is of
+version 5: elements of a type, a length and data, padded to 8 bytes; a struct is a matrix whose elements are
+matrices, and a compressed element is zlib's. An object that MATLAB itself saved is closed to others:
+`toStruct` opens it. Its fish-eye is Scaramuzza's, which no lens here is. MAT-File Format, The MathWorks.
 """
 
 from __future__ import annotations
@@ -61,23 +61,29 @@ def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str
             "In MATLAB: cameraParams = toStruct(cameraParams); save(name, 'cameraParams').",
         )
     return {
-        name: Contents(_of_fields(fields, document, image_size), name=name) for name, fields in cameras.items()
+        name: Contents(_of_fields(fields, document, image_size), name=name)
+        for name, fields in cameras.items()
     }
 
 
 def _of_fields(fields: Mapping[str, Any], document: Document, image_size: tuple[int, int] | None) -> Camera:
     if "K" in fields or "IntrinsicMatrix" in fields:
-        values = np.array(numbers(_plain(fields.get("K", fields.get("IntrinsicMatrix"))), "K", document, count=9))
+        values = np.array(
+            numbers(_plain(fields.get("K", fields.get("IntrinsicMatrix"))), "K", document, count=9)
+        )
         matrix = values.reshape(3, 3) if "K" in fields else values.reshape(3, 3).T
         intrinsics = Intrinsics(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], matrix[0, 1])
     else:
-        focal = numbers(_plain(fields.get("FocalLength")), "FocalLength", document, count=2)
-        centre = numbers(_plain(fields.get("PrincipalPoint")), "PrincipalPoint", document, count=2)
-        skew = numbers(_plain(fields.get("Skew", np.zeros((1, 1)))), "Skew", document, count=1)
-        intrinsics = Intrinsics(*focal, *centre, *skew)
+        fx, fy = numbers(_plain(fields.get("FocalLength")), "FocalLength", document, count=2)
+        cx, cy = numbers(_plain(fields.get("PrincipalPoint")), "PrincipalPoint", document, count=2)
+        (skew,) = numbers(_plain(fields.get("Skew", np.zeros((1, 1)))), "Skew", document, count=1)
+        intrinsics = Intrinsics(fx, fy, cx, cy, skew)
     radial = numbers(_plain(fields["RadialDistortion"]), "RadialDistortion", document)
     tangential = numbers(
-        _plain(fields.get("TangentialDistortion", np.zeros((1, 2)))), "TangentialDistortion", document, count=2
+        _plain(fields.get("TangentialDistortion", np.zeros((1, 2)))),
+        "TangentialDistortion",
+        document,
+        count=2,
     )
     return _camera(intrinsics, radial, tangential, _plain(fields.get("ImageSize")), document, image_size)
 
@@ -96,7 +102,8 @@ def _camera(
     if image_size is None:
         if not isinstance(sides, list) or not sides:
             raise document.refuse(
-                "does not say how large its images are (ImageSize)", "Hand in image_size (--image-size 640x480)."
+                "does not say how large its images are (ImageSize)",
+                "Hand in image_size (--image-size 640x480).",
             )
         rows, columns = numbers(sides, "ImageSize", document, count=2)
         image_size = whole_number(columns, "ImageSize", document), whole_number(rows, "ImageSize", document)
@@ -104,18 +111,20 @@ def _camera(
 
 
 def _of_line(document: Document, image_size: tuple[int, int] | None) -> Camera:
-    """The camera of a line `cameraIntrinsics([fx fy], [cx cy], [rows columns], 'RadialDistortion', [..], ...)`."""
+    """The camera of a line `cameraIntrinsics([fx fy], [cx cy], [rows columns], 'RadialDistortion', [..],
+    ...)`.
+    """
     text = document.text or ""
     whole = re.search(r"cameraIntrinsics\(([^()]*)\)", text)
-    call = whole and re.match(
-        r"\s*(\[[^\]]*\]|[\w.+-]+)\s*,\s*\[([^\]]*)\]\s*,\s*\[([^\]]*)\]", whole[1]
-    )
+    call = whole and re.match(r"\s*(\[[^\]]*\]|[\w.+-]+)\s*,\s*\[([^\]]*)\]\s*,\s*\[([^\]]*)\]", whole[1])
     if not whole or not call:
         raise document.refuse("has no whole cameraIntrinsics([fx fy], [cx cy], [rows columns], ...)")
     focal = numbers(call[1].strip("[]"), "focal length", document)
     named = {
         name: numbers(values.strip("[]"), name, document)
-        for name, values in re.findall(r"['\"](\w+)['\"]\s*,\s*(\[[^\]]*\]|[\d.eE+-]+)", whole[1][call.end() :])
+        for name, values in re.findall(
+            r"['\"](\w+)['\"]\s*,\s*(\[[^\]]*\]|[\d.eE+-]+)", whole[1][call.end() :]
+        )
     }
     skew = named.get("Skew", [0.0])[0]
     centre = numbers(call[2], "principal point", document, count=2)
@@ -190,7 +199,8 @@ def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Any]:
         if not 1 <= length <= len(names) or len(names) // length > MOST_FIELDS or int(shape.prod()) != 1:
             raise ValueError("a struct without fields")
         fields = [
-            names[i : i + length].split(b"\0")[0].decode("ascii", "replace") for i in range(0, len(names), length)
+            names[i : i + length].split(b"\0")[0].decode("ascii", "replace")
+            for i in range(0, len(names), length)
         ]
         values = [
             _matrix(part, order, depth + 1)[1] if kind == MATRIX and part and depth < DEEPEST else None
@@ -204,7 +214,7 @@ def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Any]:
 
 
 def _array(kind: int, data: bytes, order: str) -> ndarray:
-    return np.frombuffer(data, dtype=np.dtype(DTYPES[kind]).newbyteorder(order))
+    return np.frombuffer(data, dtype=np.dtype(order + DTYPES[kind]))
 
 
 def _write(contents: Contents, place: Path) -> Files:
@@ -216,7 +226,8 @@ def _write(contents: Contents, place: Path) -> Files:
     width, height = camera.image_size
     if place.suffix.lower() == ".m":
         return {
-            place: f"{contents.name} = cameraIntrinsics([{fx!r} {fy!r}], [{cx!r} {cy!r}], [{height} {width}], ..."
+            place: f"{contents.name} = cameraIntrinsics([{fx!r} {fy!r}], [{cx!r} {cy!r}], [{height}"
+            f" {width}], ..."
             f"\n    'RadialDistortion', [{k1!r} {k2!r} {k3!r}], 'TangentialDistortion', [{p1!r} {p2!r}], ..."
             f"\n    'Skew', {skew!r});\n"
         }
@@ -273,6 +284,7 @@ MATLAB = Format(
     write=_write,
     skew=True,
     pixel_origin=1.0,
-    remarks="The .mat is a struct of the fields, the .m a call of cameraIntrinsics; an object that MATLAB saved must go"
+    remarks="The .mat is a struct of the fields, the .m a call of cameraIntrinsics; an object that MATLAB"
+    " saved must go"
     " through toStruct.",
 )

@@ -1,7 +1,8 @@
 """Meshroom's (AliceVision's) .sfm: intrinsics as text in JSON, with a focal length in millimetres.
 
-From version 1.2.1 of the file the principal point is an offset from the image's middle, before it was a place. The
-focal length in pixels is the one in millimetres times width over sensorWidth; before 1.2 it stood as pxFocalLength.
+From version 1.2.1 of the file the principal point is an offset from the image's middle, before it was a
+place. The focal length in pixels is the one in millimetres times width over sensorWidth; before 1.2 it stood
+as pxFocalLength.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ def _camera(
     if tuple(version) >= OFFSET_FROM:
         cx, cy = cx + 0.5 * size[0], cy + 0.5 * size[1]
     coefficients = entry.get("distortionParams") or []
-    lens = MESHROOM.lens(str(entry.get("type")), numbers(coefficients, "distortionParams", document), document)
+    lens = MESHROOM.lens(
+        str(entry.get("type")), numbers(coefficients, "distortionParams", document), document
+    )
     return Camera(size, Intrinsics(fx, fy, cx, cy), lens)
 
 

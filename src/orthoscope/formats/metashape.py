@@ -1,8 +1,9 @@
 """Agisoft Metashape's camera calibration (XML), projections frame and fisheye.
 
-u = w/2 + cx + f x_d + b1 x_d + b2 y_d, v = h/2 + cy + f y_d, the centre of the first pixel being (0.5, 0.5). Its p1 is
-OpenCV's p2 and its p2 OpenCV's p1. For the fish-eye the polynomial is that of the angle. Older files (PhotoScan) have
-fx, fy and cx, cy from the corner instead. Metashape Professional manual, appendix on camera models.
+u = w/2 + cx + f x_d + b1 x_d + b2 y_d, v = h/2 + cy + f y_d, the centre of the first pixel being (0.5, 0.5).
+Its p1 is OpenCV's p2 and its p2 OpenCV's p1. For the fish-eye the polynomial is that of the angle. Older
+files (PhotoScan) have fx, fy and cx, cy from the corner instead. Metashape Professional manual, appendix on
+camera models.
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str
 
     for name in ("p3", "p4"):
         if value(name):
-            raise document.refuse(f"has a coefficient {name}, which no lens here has", "Calibrate without it.")
+            raise document.refuse(
+                f"has a coefficient {name}, which no lens here has", "Calibrate without it."
+            )
     size = image_size or (
         whole_number(fields.get("width"), "width", document),
         whole_number(fields.get("height"), "height", document),

@@ -1,8 +1,8 @@
 """mrcal's .cameramodel: a Python dictionary of plain values, with comments.
 
-LENSMODEL_OPENCV4, 5, 8 and 12 are OpenCV's, LENSMODEL_PINHOLE has no coefficients; a centre as ours. The camera
-stands in the reference frame (no extrinsics). valid_intrinsics_region is the hull of the corners that the camera
-was made from: beyond it the camera is not known.
+LENSMODEL_OPENCV4, 5, 8 and 12 are OpenCV's, LENSMODEL_PINHOLE has no coefficients; a centre as ours. The
+camera stands in the reference frame (no extrinsics). valid_intrinsics_region is the hull of the corners that
+the camera was made from: beyond it the camera is not known.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from orthoscope.formats.opencv import OPENCV_ORDER
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, numbers, whole_number
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.opencv_order import OPENCV_ORDER
 
 __all__ = ["MRCAL"]
 
@@ -36,7 +36,10 @@ def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str
     lens = MRCAL.lens(str(table.get("lensmodel")), values[4:], document)
     if image_size is None:
         sides = numbers(table.get("imagersize"), "imagersize", document, count=2)
-        image_size = whole_number(sides[0], "imagersize", document), whole_number(sides[1], "imagersize", document)
+        image_size = (
+            whole_number(sides[0], "imagersize", document),
+            whole_number(sides[1], "imagersize", document),
+        )
     return {"camera": Contents(Camera(image_size, Intrinsics(*values[:4]), lens))}
 
 

@@ -1,8 +1,8 @@
 """transforms.json of nerfstudio and instant-ngp: one camera, and a pose for each photograph.
 
-The centre of the first pixel is (0.5, 0.5). A pose is world from camera with OpenGL's axes: x right, y up, z back.
-Both tools know k1, k2, p1, p2 and four coefficients of the fish-eye; nerfstudio takes k3 and k4 for further terms of
-the polynomial, so a rational lens must never stand in this file.
+The centre of the first pixel is (0.5, 0.5). A pose is world from camera with OpenGL's axes: x right, y up, z
+back. Both tools know k1, k2, p1, p2 and four coefficients of the fish-eye; nerfstudio takes k3 and k4 for
+further terms of the polynomial, so a rational lens must never stand in this file.
 """
 
 from __future__ import annotations
@@ -56,7 +56,9 @@ def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str
     cy = number(table.get("cy", 0.5 * height), "cy", document)
     wide = table.get("camera_model") == "OPENCV_FISHEYE" or table.get("is_fisheye") is True
     word = "OPENCV_FISHEYE" if wide else "OPENCV"
-    known = {name: number(table.get(name, 0.0), name, document) for name in ("k1", "k2", "k3", "k4", "p1", "p2")}
+    known = {
+        name: number(table.get(name, 0.0), name, document) for name in ("k1", "k2", "k3", "k4", "p1", "p2")
+    }
     if not wide and known["k4"]:
         raise document.refuse("has a term k4 of the 8th power, which no lens here has", "Fit it without k4.")
     lens = NERFSTUDIO.lens(word, [known[name] for name in COEFFICIENTS[word]], document)
@@ -117,7 +119,8 @@ def _write(contents: Contents, place: Path) -> Files:
     if holding.word == "OPENCV_FISHEYE":
         table["is_fisheye"] = True
     table["frames"] = [
-        {"file_path": image, "transform_matrix": _opengl_matrix(pose)} for image, pose in contents.poses.items()
+        {"file_path": image, "transform_matrix": _opengl_matrix(pose)}
+        for image, pose in contents.poses.items()
     ]
     return {place: json.dumps(table, indent=2) + "\n"}
 

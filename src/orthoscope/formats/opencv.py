@@ -1,9 +1,9 @@
 """OpenCV's calibration files: YAML, XML or JSON of cv2.FileStorage.
 
-OpenCV's own sample, its interactive tool and our export name the same things differently; all of these are read.
-Coefficients stand in OpenCV's order, 4, 5, 8, 12 or 14 of cv2.calibrateCamera or 4 of cv2.fisheye, as few as hold
-them all. `fisheye_model` is what OpenCV's sample looks for, `distortion_model` what our older files have. The files
-are read without cv2.FileStorage, which ends the process on some damaged ones.
+OpenCV's own sample, its interactive tool and our export name the same things differently; all of these are
+read. Coefficients stand in OpenCV's order, 4, 5, 8, 12 or 14 of cv2.calibrateCamera or 4 of cv2.fisheye, as
+few as hold them all. `fisheye_model` is what OpenCV's sample looks for, `distortion_model` what our older
+files have. The files are read without cv2.FileStorage, which ends the process on some damaged ones.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, matrix, number, whole_number, yaml_list
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.opencv_order import OPENCV_ORDER
 
-__all__ = ["OPENCV", "OPENCV_ORDER"]
+__all__ = ["OPENCV"]
 
-OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
 # Names by which a camera's matrix and coefficients go in OpenCV's samples, tools and tutorials.
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "intrinsic_matrix", "mtx", "K", "M1")
 COEFFICIENTS = (
@@ -133,7 +133,9 @@ WRITERS = {".xml": _as_xml, ".json": _as_json}
 def _table_of(root: Element) -> dict[str, Any]:
     """XML as what YAML and JSON give: elements by name, matrices as objects, the rest as text."""
     return {
-        element.tag: {part.tag: (part.text or "").strip() for part in element} if len(element) else element.text
+        element.tag: {part.tag: (part.text or "").strip() for part in element}
+        if len(element)
+        else element.text
         for element in root
     }
 

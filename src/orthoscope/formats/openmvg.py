@@ -1,7 +1,7 @@
 """OpenMVG's sfm_data.json: intrinsics with one focal length, and the photographs' poses.
 
-Distortion of pinhole_brown_t2 is k1 k2 k3 t1 t2, t1 and t2 being OpenCV's p1 and p2; fisheye has the four coefficients
-of the angle. A pose is a rotation, camera from world, and the camera's centre in the world.
+Distortion of pinhole_brown_t2 is k1 k2 k3 t1 t2, t1 and t2 being OpenCV's p1 and p2; fisheye has the four
+coefficients of the angle. A pose is a rotation, camera from world, and the camera's centre in the world.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ FIELDS = {
     "pinhole_brown_t2": "disto_t2",
     "fisheye": "fisheye",
 }
-# Marks of cereal, the library that writes these files: an object seen for the first time, of a named or plain kind.
+# Marks of cereal, the library that writes these files: an object seen for the first time, of a named or plain
+# kind.
 FIRST, PLAIN = 0x80000000, 0x40000000
 
 
@@ -88,7 +89,9 @@ def _poses(document: Document) -> dict[str, Pose]:
         images[str(data.get("id_pose"))] = str(data.get("filename"))
     poses = {}
     for key, value in _entries(document.json, "extrinsics"):
-        rotation = np.array(numbers(value.get("rotation"), f"rotation {key[:20]}", document, count=9)).reshape(3, 3)
+        rotation = np.array(
+            numbers(value.get("rotation"), f"rotation {key[:20]}", document, count=9)
+        ).reshape(3, 3)
         centre = np.array(numbers(value.get("center"), f"center {key[:20]}", document, count=3))
         try:
             poses[images.get(key, key)] = Pose(rotation, -rotation @ centre)
@@ -125,7 +128,10 @@ def _write(contents: Contents, place: Path) -> Files:
             }
         ],
         "extrinsics": [
-            {"key": i, "value": {"rotation": pose.rotation.tolist(), "center": pose.inverse().translation.tolist()}}
+            {
+                "key": i,
+                "value": {"rotation": pose.rotation.tolist(), "center": pose.inverse().translation.tolist()},
+            }
             for i, pose in enumerate(contents.poses.values())
         ],
         "structure": [],

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from orthoscope.formats.opencv import OPENCV_ORDER
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.ros import camera_of_matrix
 from orthoscope.formats.syntax import Document, matrix, whole_number
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.camera import Camera
+from orthoscope.models.opencv_order import OPENCV_ORDER
 
 __all__ = ["PHOTONVISION"]
 

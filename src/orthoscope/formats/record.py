@@ -1,10 +1,11 @@
-"""What a tool's file is: the record `Format`, the lenses that it holds and what goes into a file or comes out of it.
+"""What a tool's file is: the record `Format`, the lenses that it holds and what goes into a file or comes out
+of it.
 
-Everything that help texts, errors, the choice of a formula and docs/formats.md say of a tool is in its record. A
-record's lenses are `Holding`s: our name of a lens, the tool's word, and the coefficients in the tool's order. What
-a camera has beyond them (a coefficient that is not zero, a skew, two focal lengths, a centre of its own) the tool
-cannot hold; `export` then fits what it can. Cameras in `Contents` have the tool's pixel origin; `export` and `load`
-shift them, so that no tool's file does.
+Everything that help texts, errors, the choice of a formula and docs/formats.md say of a tool is in its
+record. A record's lenses are `Holding`s: our name of a lens, the tool's word, and the coefficients in the
+tool's order. What a camera has beyond them (a coefficient that is not zero, a skew, two focal lengths, a
+centre of its own) the tool cannot hold; `export` then fits what it can. Cameras in `Contents` have the tool's
+pixel origin; `export` and `load` shift them, so that no tool's file does.
 """
 
 from __future__ import annotations
@@ -95,7 +96,8 @@ class Format:
     Args:
         name: as `--to` takes it.
         title: the tool and its file, for people.
-        suffixes: of its files, the usual one first; where there are several, the suffix says which is written.
+        suffixes: of its files, the usual one first; where there are several, the suffix says which is
+            written.
         holdings: the lenses that it has, those to be preferred first.
         recognises: whether a document is such a file, by its content.
         read: the cameras of such a file, by name; the last argument is an image size for files that lack it.
@@ -130,7 +132,11 @@ class Format:
         richest: dict[str, Holding] = {}
         for holding in self.holdings:
             known = richest.get(holding.lens)
-            if holding.written and holding.lens != FREE and (known is None or len(holding.coefficients) > len(known.coefficients)):
+            if (
+                holding.written
+                and holding.lens != FREE
+                and (known is None or len(holding.coefficients) > len(known.coefficients))
+            ):
                 richest[holding.lens] = holding
         return tuple(holding.description() for holding in richest.values())
 
@@ -177,8 +183,10 @@ class Format:
             coefficients = isinstance(camera.lens, FreeLens) or lens_name(camera.lens) not in {
                 holding.lens for holding in self.holdings
             }
-            return f"this {lens_name(camera.lens)} lens" if coefficients else (
-                f"all coefficients of this {lens_name(camera.lens)} lens"
+            return (
+                f"this {lens_name(camera.lens)} lens"
+                if coefficients
+                else (f"all coefficients of this {lens_name(camera.lens)} lens")
             )
         return ""
 

@@ -1,4 +1,5 @@
-"""ROS's camera_info as camera_calibration_parsers reads it: YAML with camera, distortion, rectification, projection.
+"""ROS's camera_info as camera_calibration_parsers reads it: YAML with camera, distortion, rectification,
+projection.
 
 plumb_bob has 5 coefficients, rational_polynomial 8, equidistant the 4 of cv2.fisheye. A topic's message as
 `rostopic echo` prints it (K, D) is read by foxglove.py, which has the same fields.
@@ -11,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from orthoscope.formats.opencv import OPENCV_ORDER
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, matrix, whole_number, yaml_list
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.opencv_order import OPENCV_ORDER
 
 __all__ = ["ROS", "camera_of_matrix"]
 

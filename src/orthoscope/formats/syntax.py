@@ -1,9 +1,11 @@
-"""The syntaxes that tools write cameras in, read into plain values: dict, list, str, and numbers where JSON has them.
+"""The syntaxes that tools write cameras in, read into plain values: dict, list, str, and numbers where JSON
+has them.
 
-Nothing here trusts the file: depth and size are bounded, nothing is executed, no entity is expanded, and whatever
-is wrong ends in an `InputError` that names the file. YAML goes by its events, so that no depth of nesting reaches
-the stack; its scalars stay text, which `number` turns into numbers, since 1e-05 is a number to one YAML reader and
-a word to the next. Tags such as OpenCV's `!!opencv-matrix` say nothing that the keys do not, and are passed over.
+Nothing here trusts the file: depth and size are bounded, nothing is executed, no entity is expanded, and
+whatever is wrong ends in an `InputError` that names the file. YAML goes by its events, so that no depth of
+nesting reaches the stack; its scalars stay text, which `number` turns into numbers, since 1e-05 is a number
+to one YAML reader and a word to the next. Tags such as OpenCV's `!!opencv-matrix` say nothing that the keys
+do not, and are passed over.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ LONGEST_SHOWN = 40
 
 
 class Document:
-    """A file that is to be read: its bytes, and what they are in each syntax (None where they are not of it)."""
+    """A file that is to be read: its bytes, and what they are in each syntax (None where they are not of
+    it).
+    """
 
     def __init__(self, path: str | Path, content: bytes | None = None) -> None:
         self.path = Path(path)
@@ -129,7 +133,9 @@ def whole_number(value: Any, what: str, document: Document) -> int:
     """
     converted = number(value, what, document)
     if converted != int(converted) or not 1 <= converted <= LARGEST_SIDE:
-        raise document.refuse(f"has {_shown(value)} as {what}; expected a whole number from 1 to {LARGEST_SIDE}")
+        raise document.refuse(
+            f"has {_shown(value)} as {what}; expected a whole number from 1 to {LARGEST_SIDE}"
+        )
     return int(converted)
 
 

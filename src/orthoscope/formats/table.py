@@ -1,8 +1,9 @@
-"""`FORMATS`, the table of tools by name that everything else goes by: what `--to` takes, what is read by content.
+"""`FORMATS`, the table of tools by name that everything else goes by: what `--to` takes, what is read by
+content.
 
-A tool is one file of this room with one record; entered here, the command line, errors, completions, the choice of a
-formula and docs/formats.md know it. A document is taken for the first tool that recognises it, so those that are sure
-come first.
+A tool is one file of this room with one record; entered here, the command line, errors, completions, the
+choice of a formula and docs/formats.md know it. A document is taken for the first tool that recognises it, so
+those that are sure come first.
 """
 
 from __future__ import annotations

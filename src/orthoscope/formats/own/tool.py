@@ -1,4 +1,6 @@
-"""Our own files in the table of tools: every lens, its centre, a skew; and poses with a calibration or a scene."""
+"""Our own files in the table of tools: every lens, its centre, a skew; and poses with a calibration or a
+scene.
+"""
 
 from __future__ import annotations
 
