@@ -132,7 +132,8 @@ def _write(contents: Contents, place: Path) -> Files:
         f"    <model>{escape(contents.name)}</model>\n    <mount>{escape(contents.name)}</mount>\n"
         f"    <cropfactor>1</cropfactor>\n    <aspect-ratio>{width}:{height}</aspect-ratio>\n"
         f'    <center x="{float(dx)!r}" y="{float(dy)!r}"/>\n    <calibration>\n'
-        f'      <distortion model="{holding.word}" focal="{mm!r}" {attributes}/>\n    </calibration>\n  </lens>\n'
+        f'      <distortion model="{holding.word}" focal="{mm!r}" {attributes}/>\n'
+        "    </calibration>\n  </lens>\n"
         "</lensdatabase>\n"
     }
 

@@ -126,14 +126,14 @@ def _of_line(document: Document, image_size: tuple[int, int] | None) -> Camera:
             r"['\"](\w+)['\"]\s*,\s*(\[[^\]]*\]|[\d.eE+-]+)", whole[1][call.end() :]
         )
     }
-    skew = named.get("Skew", [0.0])[0]
-    centre = numbers(call[2], "principal point", document, count=2)
+    skew = [*named.get("Skew", []), 0.0][0]
+    cx, cy = numbers(call[2], "principal point", document, count=2)
     sides = numbers(call[3], "image size", document, count=2)
     tangential = [*named.get("TangentialDistortion", []), 0.0, 0.0][:2]
     if not 1 <= len(focal) <= 2:
         raise document.refuse(f"has {len(focal)} focal lengths; expected fx and fy")
     return _camera(
-        Intrinsics(focal[0], focal[-1], *centre, skew),
+        Intrinsics(focal[0], focal[-1], cx, cy, skew),
         named.get("RadialDistortion", [0.0, 0.0]),
         tangential,
         sides,
