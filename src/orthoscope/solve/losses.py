@@ -35,7 +35,7 @@ class Loss(ABC):
             )
 
     @abstractmethod
-    def cost(self, squared: ndarray) -> ndarray:
+    def cost(self, squared: ndarray) -> ndarray | np.float64:
         """rho(q) of squared residuals q >= 0."""
 
     @abstractmethod
@@ -67,7 +67,7 @@ class Huber(Loss):
 class Cauchy(Loss):
     """Squares near, logarithm far: a gross error is all but forgotten."""
 
-    def cost(self, squared: ndarray) -> ndarray:
+    def cost(self, squared: ndarray) -> ndarray | np.float64:
         c2 = self.scale**2
         return c2 * np.log1p(squared / c2)
 
