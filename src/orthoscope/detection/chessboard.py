@@ -20,7 +20,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.detection.grid import cross, grid_shape, one_line_more
+from orthoscope.detection.grid import cross, grid_shape, lattice, one_line_more
 from orthoscope.detection.refine import refined
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 
@@ -71,7 +71,7 @@ def _boards(
     """Refined corners of what the rungs find, as far as it is a board."""
     for rough in _sightings(grey, columns, rows, ladder):
         if _is_grid(grey, rough, columns, rows):
-            corners = refined(grey, rough, columns, rows)
+            corners = refined(grey, rough, lattice(columns, rows)).pixels
             if _is_grid(grey, corners, columns, rows) and _alternates(grey, corners, columns, rows):
                 yield corners
 
@@ -146,7 +146,7 @@ def _resized(grey: ndarray, side: int) -> ndarray:
 
 def _is_grid(grey: ndarray, corners: ndarray, columns: int, rows: int) -> bool:
     """Whether corners lie in the picture, without folds, each on its neighbours' lines."""
-    shape = grid_shape(corners, columns, rows)
+    shape = grid_shape(corners, lattice(columns, rows))
     turn = cross(shape.along, shape.down)
     inside = ((corners >= 0) & (corners <= np.array(grey.shape[::-1]) - 1)).all()
     return bool(inside and ((turn > 0).all() or (turn < 0).all()) and shape.stray.max() <= FARTHEST_STRAY)
@@ -221,7 +221,7 @@ def _strengths(grey: ndarray, grid: ndarray) -> ndarray:
     """
     rows, columns = grid.shape[:2]
     corners = grid.reshape(-1, 2)
-    shape = grid_shape(corners, columns, rows)
+    shape = grid_shape(corners, lattice(columns, rows))
     steps = np.array([0.15, 0.25, 0.35])  # squares from the corner
     along = np.array([1, -1, 1, -1])[:, None, None] * steps[:, None]
     down = np.array([1, -1, -1, 1])[:, None, None] * steps
