@@ -1,11 +1,11 @@
-"""Corners of a lattice as they lie in the picture: its local directions, how its lines bend, and where it stops
-being a lattice.
+"""Corners of a lattice as they lie in the picture: its local directions, how its lines bend, and where it
+stops being a lattice.
 
-Corners come with their places, column and row in steps of the lattice, so that it does not matter which of them
-were found. At each a cubic is laid through the nearest four of its row, and of its column: its slope is one step
-in pixels, its second derivative how a straight edge bends there (a lens does that). A parabola fitted to the
-nearest five says whether a corner is on its neighbours' line: one that lies far from it has been mistaken for
-something else.
+Corners come with their places, column and row in steps of the lattice, so that it does not matter which of
+them were found. At each a cubic is laid through the nearest four of its row, and of its column: its slope is
+one step in pixels, its second derivative how a straight edge bends there (a lens does that). A parabola
+fitted to the nearest five says whether a corner is on its neighbours' line: one that lies far from it has
+been mistaken for something else.
 """
 
 from __future__ import annotations
@@ -91,7 +91,8 @@ def _curvature(slope: ndarray, turn: ndarray) -> ndarray:
 def _along_lines(
     corners: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], axis: int
 ) -> tuple[Float[ndarray, "m 2"], Float[ndarray, "m 2"], Float[ndarray, "m 2"]]:
-    """First and second derivative along the lattice's lines, and the place on the smooth line, of each corner.
+    """First and second derivative along the lattice's lines, and the place on the smooth line, of each
+    corner.
 
     A corner that is alone on its line has the slope of the corner nearest to it that is not.
     """
@@ -124,8 +125,8 @@ def _lines(places: Float[ndarray, "m 2"], axis: int) -> list[ndarray]:
 
 @cache
 def _polynomials(places: tuple[float, ...], nearest: int, degree: int) -> Float[ndarray, "3 count count"]:
-    """Matrices from the points of a line to value, first and second derivative, at each, of a polynomial fitted
-    to the nearest.
+    """Matrices from the points of a line to value, first and second derivative, at each, of a polynomial
+    fitted to the nearest.
     """
     count, at = len(places), np.array(places)
     width = min(nearest, count)
