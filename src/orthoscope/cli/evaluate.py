@@ -35,7 +35,7 @@ with --target they show that one, taken as it is said to be.
 )
 @options.target
 @options.image_size
-@options.folds
+@options.folds_anew
 @options.jobs
 @options.cluster
 @options.as_json
@@ -44,28 +44,27 @@ def evaluate(
     others: tuple[str, ...],
     target: str | None,
     image_size: tuple[int, int] | None,
-    folds: int,
+    folds: int | None,
     jobs: int | None,
     cluster: str | None,
     as_json: bool,
 ) -> None:
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
-    from orthoscope.cli.executors import processes, threads
+    from orthoscope.cli.executors import threads
     from orthoscope.cli.inputs import detections_from
+    from orthoscope.cli.judged import judged
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
-    from orthoscope.evaluation.evaluate import evaluate as judge
+    from orthoscope.cli.summary import evaluation_lines, to_json
     from orthoscope.evaluation.evaluate import evaluate_on
-    from orthoscope.formats.own.json import load_calibration
+    from orthoscope.formats.own.json import load_calibration, text_of
 
-    loaded = load_calibration(calibration)
     if not others:
-        with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
-            evaluation = judge(loaded, folds=folds, executor=executor, progress=progress)
+        evaluation = judged(calibration, folds=folds, jobs=jobs, cluster=cluster)
         click.echo(
-            to_json(evaluation_numbers(evaluation)) if as_json else "\n".join(evaluation_lines(evaluation))
+            text_of(evaluation) if as_json else "\n".join(evaluation_lines(evaluation)) + "\n", nl=False
         )
         return
+    loaded = load_calibration(calibration)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         board = target or loaded.detections.target
         detections, _ = detections_from(

@@ -42,6 +42,9 @@ class View:
         object.__setattr__(self, "ids", ids)
         object.__setattr__(self, "pixels", pixels)
 
+    def __repr__(self) -> str:
+        return f"View({self.image!r}, {len(self.ids)} corners)"
+
 
 class SetAside(NamedTuple):
     """A photograph that takes no part, and why."""
@@ -97,6 +100,12 @@ class Detections:
                     f"view {view.image!r} has corner {int(view.ids.max())}; target {self.target.name!r} has"
                     f" corners 0 to {len(self.target.points) - 1}. Name the target that was photographed."
                 )
+
+    def __repr__(self) -> str:
+        width, height = self.image_size
+        aside = f", {len(self.set_aside)} set aside" if self.set_aside else ""
+        seen = f"{len(self.views)} views of {width}x{height}, {self.corners} corners"
+        return f"Detections({self.target.name}, {seen}{aside})"
 
     @property
     def corners(self) -> int:

@@ -58,6 +58,9 @@ class Target:
         if self.board is None and self.grid is not None:
             object.__setattr__(self, "board", _board_on(self.grid, points))
 
+    def __repr__(self) -> str:
+        return f"Target({self.name!r}, {len(self.points)} corners)"
+
     def _check_grid(self, columns: int, rows: int) -> None:
         if columns * rows != len(self.points):
             raise InputError(
