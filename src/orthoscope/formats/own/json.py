@@ -112,7 +112,7 @@ def load(path: str | Path) -> Any:
     return _loaded(read_bytes(path), path)
 
 
-def _loaded(content: bytes, path: str | Path) -> Detections | Calibration | Camera | Scene:
+def _loaded(content: bytes, path: str | Path) -> Any:
     """What the bytes of a file of ours hold; errors as `load`."""
     content = content.removeprefix(b"\xef\xbb\xbf")
     kind = _kind(content, path)
