@@ -48,14 +48,14 @@ def report(
     out: Path,
 ) -> None:
     """Write the report page of a calibration: one HTML file that needs nothing else."""
-    from orthoscope.cli.judged import judged
+    from orthoscope.cli.judged import judged_calibration
     from orthoscope.files.images import photographs
     from orthoscope.files.whole_files import check_folder
     from orthoscope.report.page import write_report
     from orthoscope.straight.undistort import before_and_after
 
     check_folder(out.parent)
-    evaluation = judged(calibration, folds=folds, jobs=jobs, cluster=cluster)
+    evaluation = judged_calibration(calibration, folds=folds, jobs=jobs, cluster=cluster)
     files = {path.name: path for path in photographs(photos)} if photos else {}
     write_report(evaluation, out, photograph=before_and_after(evaluation.calibration, files, keep=keep))
     click.echo(f"wrote      {out}")

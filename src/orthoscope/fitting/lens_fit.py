@@ -123,11 +123,13 @@ def about_principal_point(
 
     parameters = Parameters.of(free)
 
-    def columns(camera, rays, _):
+    def columns(
+        camera: Camera, rays: Float[ndarray, "n 3"], _: Sequence[str]
+    ) -> tuple[Float[ndarray, "k 2 n"], Float[ndarray, "2 n"]]:
         image = camera.linearise(rays.T, parameters)
         return image.by_parameters(), np.stack([image.u, image.v])
 
-    def moved(camera, _, step):
+    def moved(camera: Camera, _: Sequence[str], step: Float[ndarray, " k"]) -> Camera:
         return parameters.moved(camera, step)
 
     return Pairs(rays, pixels, parameters.names, columns=columns, moved=moved)

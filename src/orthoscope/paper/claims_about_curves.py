@@ -15,7 +15,7 @@ from orthoscope.geometry.arrays import Bool, ndarray
 from orthoscope.paper.claims import MAIN, Claim, Verdict, share
 from orthoscope.paper.curves import Curve, Curves
 from orthoscope.paper.entries import FCCM, FCCM5, MLDC, NMLDC
-from orthoscope.paper.wording import each_of, listed, number, span, times
+from orthoscope.paper.wording import each_of, listed, short_number, span, times
 
 __all__ = [
     "Axis",
@@ -67,7 +67,8 @@ def better_on_test(where: str, curves: Curves, axis: Axis) -> Claim:
     mine, theirs = mldc.test_nce[both].mean(), fccm.test_nce[both].mean()
     finding = (
         f"MLDC's test NCE is below FCCM's, by more than their standard errors, at {wins} of {of}"
-        f" {axis.levels}; on average it is {number(mine)} against {number(theirs)}{times(mine, theirs)}."
+        f" {axis.levels}; on average it is {short_number(mine)} against"
+        f" {short_number(theirs)}{times(mine, theirs)}."
     )
     return Claim(where, MAIN, share(wins, of), finding + _failed(mldc, fccm))
 
@@ -82,8 +83,8 @@ def compensated(where: str, curves: Curves, axis: Axis) -> Claim:
     worst = int(np.nanargmax(fccm.test_nce / fccm.training_nce))
     finding = (
         f"FCCM's test NCE is above its training NCE at {above} of {of} {axis.levels}; where it compares"
-        f" worst, with {axis.at(fccm.levels[worst])}, it is {number(fccm.test_nce[worst])} against"
-        f" {number(fccm.training_nce[worst])}."
+        f" worst, with {axis.at(fccm.levels[worst])}, it is {short_number(fccm.test_nce[worst])} against"
+        f" {short_number(fccm.training_nce[worst])}."
     )
     return Claim(where, paper, share(above, of), finding + _failed(fccm))
 
@@ -216,11 +217,11 @@ def fewer_than_three(where: str, curves: Curves, axis: Axis) -> Claim:
     far = mldc.test_nce[few] > reference
     said = listed(
         [
-            f"{number(nce)} with {axis.at(views)}"
+            f"{short_number(nce)} with {axis.at(views)}"
             for nce, views in zip(mldc.test_nce[few], mldc.levels[few], strict=True)
         ]
     )
-    finding = f"MLDC's test NCE is {said}; with three or more it is {number(reference)} at most."
+    finding = f"MLDC's test NCE is {said}; with three or more it is {short_number(reference)} at most."
     return Claim(where, paper, share(int(far.sum()), len(far)), finding + _failed(mldc))
 
 

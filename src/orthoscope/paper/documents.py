@@ -15,7 +15,7 @@ from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
     figures_with_claims,
     on_photographs,
-    parameters_of,
+    parameter_columns,
 )
 from orthoscope.paper.files import curves_csv, members_csv, table_csv, trials_csv
 from orthoscope.paper.page import paper_page
@@ -74,6 +74,6 @@ def _table1(results: Results) -> str:
             column.test_nce,
             column.failures,
         )
-        for column in parameters_of(results)
+        for column in parameter_columns(results)
     ]
     return table_csv(("method", *spread, "training_nce", "test_nce", "failures"), rows)

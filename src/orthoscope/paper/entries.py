@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from orthoscope.methods import METHODS
 from orthoscope.models.lenses import LENSES
 
-__all__ = ["FCCM", "FCCM5", "MLDC", "NMLDC", "PAPER", "Entry", "every_lens", "fair_peers", "with_skew"]
+__all__ = ["FCCM", "FCCM5", "MLDC", "NMLDC", "PAPER", "PaperEntry", "every_lens", "fair_peers", "with_skew"]
 
 TOLD: dict[
     str, Mapping[str, Any]
@@ -23,7 +23,7 @@ TOLD: dict[
 FCCM, NMLDC, MLDC, FCCM5 = "FCCM", "NMLDC", "MLDC", "FCCM 5 parameters"
 
 
-class Entry(NamedTuple):
+class PaperEntry(NamedTuple):
     """A method with its settings, under the name that figures and tables give it."""
 
     name: str
@@ -32,30 +32,30 @@ class Entry(NamedTuple):
 
 
 PAPER = (
-    Entry(FCCM, "fccm", {"lens": "brown:k1,k2"}),
-    Entry(NMLDC, "nmldc", {"lens": "pfet"}),
-    Entry(MLDC, "mldc", {"lens": "pfet"}),
+    PaperEntry(FCCM, "fccm", {"lens": "brown:k1,k2"}),
+    PaperEntry(NMLDC, "nmldc", {"lens": "pfet"}),
+    PaperEntry(MLDC, "mldc", {"lens": "pfet"}),
 )
 
 
-def fair_peers() -> tuple[Entry, ...]:
+def fair_peers() -> tuple[PaperEntry, ...]:
     """FCCM with k1, k2, p1, p2 and k3; and methods that the paper does not know."""
     others = sorted(set(METHODS) - {entry.method for entry in PAPER})
     return (
-        Entry(FCCM5, "fccm", {"lens": "brown"}),
-        *(Entry(name, name, TOLD.get(name, {})) for name in others),
+        PaperEntry(FCCM5, "fccm", {"lens": "brown"}),
+        *(PaperEntry(name, name, TOLD.get(name, {})) for name in others),
     )
 
 
-def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[Entry, ...]:
+def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[PaperEntry, ...]:
     """Every method with every lens, the coefficients free that a user gets by naming it."""
     return tuple(
-        Entry(f"{method} {lens}", method, {"lens": lens, **TOLD.get(method, {})})
+        PaperEntry(f"{method} {lens}", method, {"lens": lens, **TOLD.get(method, {})})
         for method in METHODS
         for lens in lenses
     )
 
 
-def with_skew(entries: tuple[Entry, ...]) -> tuple[Entry, ...]:
+def with_skew(entries: tuple[PaperEntry, ...]) -> tuple[PaperEntry, ...]:
     """The same, with oblique pixel axes allowed, as in the paper's Table 1."""
     return tuple(entry._replace(settings={**entry.settings, "skew": True}) for entry in entries)

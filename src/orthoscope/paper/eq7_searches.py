@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from orthoscope.paper.entries import MLDC, PAPER, Entry, fair_peers
-from orthoscope.paper.trials import Condition, Judgement, judged, simulated
+from orthoscope.paper.entries import MLDC, PAPER, PaperEntry, fair_peers
+from orthoscope.paper.trials import Condition, Judgement, simulated, trial_judged
 
 __all__ = ["DAMPINGS", "Eq7Search", "member", "rivals"]
 
@@ -52,7 +52,9 @@ def member(scene: str, damp: str, damping: float, *, condition: Condition, seed:
     """The camera at which eq. (7) comes to rest with this damping."""
     costs = _Costs()
     settings = {"lens": "pfet", "correct": "literal", "damp": damp, "damping": damping, "progress": costs}
-    judgement = judged(Entry(MLDC, "mldc", settings), *simulated(scene, condition, seed=seed, trial=0))
+    judgement = trial_judged(
+        PaperEntry(MLDC, "mldc", settings), *simulated(scene, condition, seed=seed, trial=0)
+    )
     return Eq7Search(scene, f"{damp} {damping:g}", costs.last[1], judgement)
 
 
@@ -64,4 +66,4 @@ def rivals(scene: str, *, condition: Condition, seed: int) -> list[Eq7Search]:
     named = [(entry.name if entry.name != MLDC else "nearest to the detections", entry) for entry in PAPER]
     named += [(entry.name, entry) for entry in fair_peers()]
     order = sorted(named, key=lambda pair: pair[1].name != MLDC)
-    return [Eq7Search(scene, name, float("nan"), judged(entry, *data)) for name, entry in order]
+    return [Eq7Search(scene, name, float("nan"), trial_judged(entry, *data)) for name, entry in order]

@@ -23,12 +23,12 @@ from orthoscope.paper.trials import Outcome
 
 __all__ = [
     "FigureWithClaims",
-    "Parameters",
+    "ParameterColumn",
     "eq7_claims",
     "fair_finding",
     "figures_with_claims",
     "on_photographs",
-    "parameters_of",
+    "parameter_columns",
     "without_noise",
 ]
 
@@ -187,7 +187,7 @@ def fair_finding(results: Results) -> str:
 
 
 @dataclass(frozen=True)
-class Parameters:
+class ParameterColumn:
     """A column of Table 1: mean errors, and of fx, fy, cu, cv (pixels) and gamma (degrees) mean and standard
     deviation over the splits.
     """
@@ -199,7 +199,7 @@ class Parameters:
     failures: int
 
 
-def parameters_of(results: Results) -> list[Parameters]:
+def parameter_columns(results: Results) -> list[ParameterColumn]:
     """Table 1, from all points; the paper's three first."""
     most = max((outcome.level for outcome in results.on_photographs), default=0.0)
     whole = [outcome for outcome in results.on_photographs if outcome.level == most]
@@ -207,11 +207,11 @@ def parameters_of(results: Results) -> list[Parameters]:
     return [_parameters(name, [outcome for outcome in whole if outcome.entry == name]) for name in names]
 
 
-def _parameters(name: str, outcomes: Sequence[Outcome]) -> Parameters:
+def _parameters(name: str, outcomes: Sequence[Outcome]) -> ParameterColumn:
     given = [outcome.judgement for outcome in outcomes if not outcome.judgement.failure]
     fx, fy, cx, cy, skew = np.array([(j.fx, j.fy, j.cx, j.cy, j.skew) for j in given]).reshape(-1, 5).T
     columns = {"fx": fx, "fy": fy, "cu": cx, "cv": cy, "gamma": obliqueness(fx, skew)}
-    return Parameters(
+    return ParameterColumn(
         name,
         {
             key: (_mean(column), float(column.std(ddof=1)) if len(column) > 1 else float("nan"))

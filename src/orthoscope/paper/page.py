@@ -19,12 +19,12 @@ from orthoscope.paper.curves import curves_of
 from orthoscope.paper.entries import FCCM
 from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
-    Parameters,
+    ParameterColumn,
     eq7_claims,
     fair_finding,
     figures_with_claims,
     on_photographs,
-    parameters_of,
+    parameter_columns,
     without_noise,
 )
 from orthoscope.paper.photographs import SPLITS, Straightened
@@ -81,7 +81,7 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         real=_figure(real) if real else None,
         detections=results.detections,
         fig7=_fig7(straightened),
-        parameters=_parameters(parameters_of(results)) if real else [],
+        parameters=_parameters(parameter_columns(results)) if real else [],
     )
 
 
@@ -219,7 +219,7 @@ def _lenses(results: Results) -> list[tuple[str, str, list[Cell], str]]:
     return rows
 
 
-def _parameters(table: list[Parameters]) -> list[tuple[str, list[str]]]:
+def _parameters(table: list[ParameterColumn]) -> list[tuple[str, list[str]]]:
     """Table 1 as the paper prints it, a row for each parameter and a column for each method, the names
     first.
     """

@@ -19,7 +19,7 @@ from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndar
 from orthoscope.methods import calibrate
 from orthoscope.paper.entries import PAPER, fair_peers, with_skew
 from orthoscope.paper.subgrids import on_subgrid, subgrids
-from orthoscope.paper.trials import Outcome, judged
+from orthoscope.paper.trials import Outcome, trial_judged
 from orthoscope.straight.undistort import undistort
 from orthoscope.targets.detections import Detections
 
@@ -86,7 +86,7 @@ def split_outcomes(
             _points(detections, grid),
             entry.name,
             turn,
-            judged(entry, on_subgrid(training, grid), test),
+            trial_judged(entry, on_subgrid(training, grid), test),
         )
         for grid in grids
         for entry in with_skew((*PAPER, *fair_peers()))

@@ -24,7 +24,7 @@ from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.methods import calibrate
 from orthoscope.models.camera import Camera
-from orthoscope.paper.entries import Entry
+from orthoscope.paper.entries import PaperEntry
 from orthoscope.paper.subgrids import on_subgrid
 from orthoscope.simulation.scene import paper_scene, simulate_detections
 from orthoscope.targets.detections import Detections
@@ -36,8 +36,8 @@ __all__ = [
     "Judgement",
     "Outcome",
     "Study",
-    "judged",
     "simulated",
+    "trial_judged",
     "trial_outcomes",
 ]
 
@@ -62,7 +62,7 @@ class Study(NamedTuple):
     name: str
     levels: tuple[float, ...]
     conditions: tuple[Condition, ...]
-    entries: tuple[Entry, ...]
+    entries: tuple[PaperEntry, ...]
 
 
 class Judgement(NamedTuple):
@@ -94,7 +94,7 @@ class Outcome(NamedTuple):
     judgement: Judgement
 
 
-def judged(entry: Entry, training: Detections, test: Detections) -> Judgement:
+def trial_judged(entry: PaperEntry, training: Detections, test: Detections) -> Judgement:
     """Calibrate from the training views and judge on both; a CalibrationError is an outcome like any
     other.
     """
@@ -132,7 +132,7 @@ def simulated(scene: str, condition: Condition, *, seed: int, trial: int) -> tup
 def trial_outcomes(study: Study, scene: str, *, seed: int, trial: int) -> list[Outcome]:
     """Every entry at every level of a study, in one trial."""
     return [
-        Outcome(study.name, scene, level, entry.name, trial, judged(entry, *data))
+        Outcome(study.name, scene, level, entry.name, trial, trial_judged(entry, *data))
         for level, data in zip(study.levels, _data(study.conditions, scene, seed, trial), strict=True)
         for entry in study.entries
     ]

@@ -46,7 +46,7 @@ def report_page(evaluation: Evaluation, *, photograph: Photograph | None = None)
         warnings=tables.warnings(evaluation),
         views=tables.view_rows(evaluation),
         settings=tables.settings_rows(calibration),
-        lens_name=tables.lens_name(calibration.camera),
+        lens_name=tables.lens_in_words(calibration.camera),
         plates=_plates(evaluation),
         photograph=shown,
     )

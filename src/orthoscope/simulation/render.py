@@ -26,7 +26,7 @@ from orthoscope.simulation.scene import Scene, random_views
 from orthoscope.simulation.sheet import Sheet
 from orthoscope.targets.target import Target, chessboard
 
-__all__ = ["Renderer", "demo_scene", "photographs", "render"]
+__all__ = ["Renderer", "demo_scene", "render", "rendered_photographs"]
 
 ROWS = 32  # rows drawn at once, so that intermediate arrays stay small
 BLACK, WHITE, BACKGROUND = 15.0, 200.0, 90.0  # grey levels before light, vignetting and noise
@@ -180,7 +180,7 @@ def render(
     return renderer.photograph(target, camera_from_target, rng=rng)
 
 
-def photographs(
+def rendered_photographs(
     scene: Scene, *, rng: np.random.Generator, renderer: Renderer | None = None
 ) -> Iterator[tuple[str, ndarray]]:
     """Name and photograph (h,w) uint8 of each view of a scene, one after the other; renderer: by default with
