@@ -19,10 +19,12 @@ Definition = ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 SECTIONS = ("Args", "Attributes", "Returns", "Raises", "Source")
 
 
-@cache
+parsed = cache(ast.parse)
+
+
 def modules(package: Path) -> dict[Path, ast.Module]:
     """The parsed files of a package, by their paths in it."""
-    return {path.relative_to(package): ast.parse(path.read_text()) for path in sorted(package.rglob("*.py"))}
+    return {path.relative_to(package): parsed(path.read_text()) for path in sorted(package.rglob("*.py"))}
 
 
 def listed(module: ast.Module) -> set[str]:
