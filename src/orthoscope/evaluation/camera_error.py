@@ -100,9 +100,7 @@ class _Variances:
         return tuple(float(np.sqrt(part)) for part in (max(alike, views) + bias, model, alike, views, bias))  # type: ignore[return-value]
 
 
-def predicted_error(
-    scatter: Scatter, seen: Float[ndarray, "s 2"], *, distance: float, richest: Scatter | None = None
-) -> CameraError:
+def predicted_error(scatter: Scatter, seen: Float[ndarray, "s 2"], *, distance: float, richest: Scatter | None = None) -> CameraError:
     """The error that is to be expected of a camera.
 
     Args:
@@ -165,9 +163,7 @@ def _settled(scatter: Scatter, rays: Float[ndarray, "n 3"], fitted: int, distanc
     with np.errstate(invalid="ignore"):
         slopes = image_slopes(scatter.camera, rays, scatter.names)
         motion = motion_slopes(scatter.camera, rays, distance)
-    undone = np.linalg.lstsq(
-        motion[:fitted].reshape(2 * fitted, -1), slopes[:fitted].reshape(2 * fitted, -1), rcond=None
-    )[0]
+    undone = np.linalg.lstsq(motion[:fitted].reshape(2 * fitted, -1), slopes[:fitted].reshape(2 * fitted, -1), rcond=None)[0]
     return slopes - motion @ undone
 
 

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orthoscope.methods.reprojection import parameter_columns
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
+from orthoscope.methods.reprojection import parameter_columns
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
 

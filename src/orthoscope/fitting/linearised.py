@@ -111,9 +111,7 @@ class Linearised:
     def only(self, rows: Int[ndarray, " v"]) -> Linearised:
         """The same fit, which all its views made, with the rows of some of them."""
         slopes = self.slopes
-        kept = replace(
-            slopes, camera=slopes.camera[rows], pose=slopes.pose[rows], spline=slopes.spline[rows], corner=slopes.corner[rows]
-        )
+        kept = replace(slopes, camera=slopes.camera[rows], pose=slopes.pose[rows], spline=slopes.spline[rows], corner=slopes.corner[rows])
         some = replace(self, slopes=kept, residual=self.residual[rows], root=self.root[rows])
         some.__dict__.update(_covariance=self._covariance, _inverse_blocks=self._inverse_blocks)
         return some

@@ -87,9 +87,7 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
     return Scatter(fit.camera, fit.names, fit.camera_covariance, alike, fit.prior_covariance, left_out.scatter)
 
 
-def patterns_over_views(
-    fit: Linearised, points: Float[ndarray, "p 3"], *, orders: Sequence[int] = ORDERS
-) -> list[Float[ndarray, "m n c"]]:
+def patterns_over_views(fit: Linearised, points: Float[ndarray, "p 3"], *, orders: Sequence[int] = ORDERS) -> list[Float[ndarray, "m n c"]]:
     """Smooth patterns over the board, in u and in v, as weighted residuals of each view: orthonormal, pose and lower orders taken out.
 
     Args:

@@ -44,7 +44,9 @@ class PairsLeftOut:
         self._T, self._gram = T, T.transpose(0, 2, 1) @ T
         self._by_shared, self._by_pose = self._steps_one(slopes.corner, slopes.pose, root)
         without = self._gram.sum(0) - self._gram
-        right = (T * (root * residual)[..., None]).sum(1) - np.einsum("mfq,mq->mf", self._by_shared.sum(0) - self._by_shared, left_out.changes)
+        right = (T * (root * residual)[..., None]).sum(1) - np.einsum(
+            "mfq,mq->mf", self._by_shared.sum(0) - self._by_shared, left_out.changes
+        )
         self.changes = np.linalg.solve(without, right[..., None])[..., 0]
         moved = residual + (slopes.camera.transpose(0, 2, 1) @ self.changes[..., None])[..., 0]
         if slopes.corner.shape[1]:

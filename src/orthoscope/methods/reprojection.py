@@ -19,7 +19,9 @@ from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.observations import Chunk, Observations, Poses
 from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Warp
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.spline import Displacement
+from orthoscope.models.warp import Bent, Warp
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
 
@@ -155,7 +157,20 @@ def with_parameters(camera: Camera, free: Sequence[str], step: Float[ndarray, " 
         values[name] = 0.5 * values[name] if name in ("fx", "fy") and not moved > 0 else moved
     coefficients = dict(zip(camera.lens.names(), camera.lens.coefficients.tolist(), strict=True))
     moved_lens = {name: coefficients[name] + length for name, length in steps.items()}
-    return replace(camera, intrinsics=Intrinsics(**values), lens=camera.lens.with_coefficients(**moved_lens))
+    K, lens = Intrinsics(**values), camera.lens.with_coefficients(**moved_lens)
+    if isinstance(lens, FreeLens) and camera.lens_frame is None:
+        lens = _kept_in_place(lens, camera.intrinsics, K)
+    return replace(camera, intrinsics=K, lens=lens)
+
+
+def _kept_in_place(lens: FreeLens, before: Intrinsics, after: Intrinsics) -> FreeLens:
+    """The lens with its displacement's lattice where it was in the image.
+
+    A lattice that went with K's principal point would have to be learnt anew wherever K goes, and would seem to say where it is.
+    """
+    scale = np.array([before.fx / after.fx, before.fy / after.fy])
+    shift = np.array([(before.cx - after.cx) / after.fx, (before.cy - after.cy) / after.fy])
+    return replace(lens, over=Displacement(lens.over.lattice.seen_from(scale, shift), lens.over.coefficients))
 
 
 def parameter_columns(camera: Camera, x: ndarray, y: ndarray, free: Sequence[str]) -> tuple[Float[ndarray, "k 2 n"], Float[ndarray, "2 n"]]:
@@ -205,20 +220,31 @@ def _set_parameter(u: ndarray, v: ndarray, group: str, at: Warp, frame: Intrinsi
 
 def _slopes(name: str, at: Warp, frame: Intrinsics, by_lens: dict[str, tuple[ndarray, ndarray]]) -> tuple[ndarray | float, ndarray | float]:
     """d(u, v) by one parameter, numbers where it is the same everywhere."""
-    match name:
-        case "fx":
-            return at.x, 0.0
-        case "fy":
-            return 0.0, at.y
-        case "cx":
-            return 1.0, 0.0
-        case "cy":
-            return 0.0, 1.0
-        case "skew":
-            return at.y, 0.0
-    x, y = by_lens[name]
-    along = frame.fx * x
-    return along + frame.skew * y if frame.skew else along, frame.fy * y
+    if name in by_lens:
+        x, y = by_lens[name]
+        along = frame.fx * x
+        return along + frame.skew * y if frame.skew else along, frame.fy * y
+    u, v = _entry(name, at.x, at.y)
+    if at.bent is None:
+        return u, v
+    moved_u, moved_v = _carried(name, at.bent, frame)
+    return u + moved_u, v + moved_v
+
+
+def _entry(name: str, x: ndarray, y: ndarray) -> tuple[ndarray | float, ndarray | float]:
+    """d(u, v) of K (x, y, 1) by an entry of K."""
+    return {"fx": (x, 0.0), "fy": (0.0, y), "cx": (1.0, 0.0), "cy": (0.0, 1.0), "skew": (y, 0.0)}[name]
+
+
+def _carried(name: str, bent: Bent, frame: Intrinsics) -> tuple[ndarray, ndarray]:
+    """d(u, v) by an entry of K through the displacement alone, which stands in the image and so meets a plane that K moves beneath it.
+
+    Skew moves nothing there: a lattice is shifted and stretched with the image (`_kept_in_place`), not sheared.
+    """
+    u, v = _entry(name, bent.x, bent.y) if name != "skew" else (0.0, 0.0)
+    x, y = u / frame.fx, v / frame.fy
+    s_x, s_y = bent.s_xx * x + bent.s_xy * y, bent.s_yx * x + bent.s_yy * y
+    return frame.fx * s_x + frame.skew * s_y, frame.fy * s_y
 
 
 def _set_pose(columns: ndarray, g: tuple[ndarray, ndarray, ndarray], q: list[ndarray], turn: ndarray | None) -> None:

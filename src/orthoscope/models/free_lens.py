@@ -18,7 +18,7 @@ from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.models.charts import Chart
 from orthoscope.models.lens import Lens
 from orthoscope.models.spline import Displacement
-from orthoscope.models.warp import Warp, invert
+from orthoscope.models.warp import Bent, Warp, invert
 
 __all__ = ["FreeLens"]
 
@@ -81,6 +81,7 @@ class FreeLens(Lens):
             yx * at.j_xx + yy * at.j_yx,
             yx * at.j_xy + yy * at.j_yy,
             [(xx * b_x + xy * b_y, yx * b_x + yy * b_y) for b_x, b_y in at.by],
+            Bent(at.x, at.y, by_x[..., 0], by_y[..., 0], by_x[..., 1], by_y[..., 1]),
         )
 
     def unwarp(self, x_d: ndarray, y_d: ndarray) -> tuple[ndarray, ndarray]:
