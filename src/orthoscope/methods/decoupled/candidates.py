@@ -24,7 +24,7 @@ from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.decoupled.step_two import formula_from_pairs
 from orthoscope.methods.decoupled.step_two_linearised import PairsLeftOut
-from orthoscope.methods.fccm import fccm
+from orthoscope.methods.fccm import fit_flat
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import FREE
 from orthoscope.targets.detections import Detections
@@ -106,7 +106,7 @@ class Candidates:
         return self.from_pairs(model).squares if model.formula else self.left_out(model).squares
 
     def _flat(self, base: str) -> Calibration:
-        return fccm(self.detections, lens=base, skew=self._skew)
+        return fit_flat(self.detections, lens=base, skew=self._skew)
 
     def _step_one(self, model: Model) -> StepOneFit:
         return fit_step_one(self.flat(model.base), target=model.target, through=model.through)

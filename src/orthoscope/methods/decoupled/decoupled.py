@@ -3,7 +3,8 @@
 The paper corrects detected corners by what perspective alone demands and fits any lens formula to (distorted,
 corrected) pairs; its eq. (7) leaves the camera open, since nothing ties the views together. What ties them is
 that one lens and one target made them all:
-0. corners and views that do not belong are named and left out (outliers.py);
+0. corners and views that do not belong are named and left out (outliers.py), boards that look alike both ways
+   up are listed one way (fitting/board_order.py);
 1. poses, the target's shape and a lens that no formula limits, together, their weights found (step_one.py,
    evidence.py);
 2. a lens formula, or the free lens itself, from the pairs of step 1 (step_two.py), or jointly.
@@ -95,7 +96,7 @@ def decoupled(
         InputError: a setting is none.
     """
     left = _open(lens, target, base, through, fit, among)
-    used = without_outliers(detections, lens=base)
+    used = fccm(without_outliers(detections, lens=base), lens=base, skew=skew).detections
     candidates = Candidates(used, skew=skew)
     assumptions: tuple[str, ...] = ()
     if len(used.views) < FEWEST_VIEWS:
