@@ -30,7 +30,7 @@ from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.methods.fccm import fccm
-from orthoscope.models.camera import Intrinsics
+from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import (
     LENSES,
@@ -76,6 +76,7 @@ def described(lens: Lens) -> str:
     return f"{lens_name(lens)}:{','.join(dict.fromkeys([*lens.free, *used]))}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in LENSES_TO_TRY if name not in NOT_RECOVERED])
 def test_without_noise_the_image_of_every_lens_comes_back(name):
     camera = camera_with(LENSES_TO_TRY[name])
@@ -271,6 +272,7 @@ def test_three_views_assume_nothing():
 # ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lens", LENSES)
 @pytest.mark.parametrize("noise_px", [0.0, 0.1])
 def test_views_that_are_all_parallel_to_the_image_are_refused_with_any_lens(lens, noise_px):
@@ -412,6 +414,7 @@ def test_progress_is_told_and_the_step_limit_is_said():
 # -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_standard_deviations_are_the_scatter_over_repeated_photographs():
     poses = random_views(NARROW, BOARD, 6, rng=np.random.default_rng(0))
     found = [fccm(seen(NARROW, poses, noise_px=0.2, seed=seed), lens="brown:k1,k2") for seed in range(30)]
@@ -435,3 +438,14 @@ def test_residuals_are_predicted_minus_detected():
         )
     assert_allclose(found.rms_px, np.sqrt((np.concatenate(found.residuals()) ** 2).sum(-1).mean()))
     assert K.skew == found.camera.intrinsics.skew == 0.0
+
+
+@pytest.mark.parametrize("away", [(880.0, 650.0), (-150.0, 250.0), (310.0, 760.0)])
+def test_a_principal_point_off_the_frame_is_found(away: tuple[float, float]):
+    true = Camera((640, 480), Intrinsics(700.0, 702.0, *away), Brown(k1=-0.1, k2=0.02))
+    detections = photographed(true, 12, noise_px=0.05, fill=(0.4, 0.7))
+    found = fccm(detections, lens="brown:k1,k2")
+    K, deviations = found.camera.intrinsics, found.uncertainty.deviations
+    assert abs(K.fx - 700.0) < 5.0 * deviations["fx"]
+    assert np.hypot(K.cx - away[0], K.cy - away[1]) < 5.0 * np.hypot(deviations["cx"], deviations["cy"])
+    assert found.rms_px < 0.1
