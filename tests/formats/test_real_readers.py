@@ -1,7 +1,7 @@
 """What the tools themselves read: their own code, where it is installed, sees the image that we see.
 
-Debian's python3-mrcal and python3-camera-calibration-parsers serve the system's Python, pycolmap any; a test skips and
-says so where its tool is absent.
+Debian's python3-mrcal and python3-camera-calibration-parsers serve the system's Python, pycolmap any; a test
+skips and says so where its tool is absent.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def test_colmap_projects_as_we_do_and_has_our_poses(tmp_path, holding, suffix):
 
 
 @holdings("opencv")
-@pytest.mark.parametrize("suffix", (".yaml", ".xml", ".json"))
+@pytest.mark.parametrize("suffix", [".yaml", ".xml", ".json"])
 def test_opencv_projects_as_we_do_with_the_file_it_reads(tmp_path, holding, suffix):
     camera = camera_held(FORMATS["opencv"], holding)
     export(camera, tmp_path / f"a{suffix}", "opencv")
