@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from orthoscope.formats.own.json import load as load
     from orthoscope.formats.own.json import load_calibration as load_calibration
     from orthoscope.formats.own.json import load_detections as load_detections
+    from orthoscope.formats.own.json import load_evaluation as load_evaluation
     from orthoscope.formats.own.json import save as save
     from orthoscope.formats.table import FORMATS as FORMATS
     from orthoscope.geometry.arrays import CalibrationError as CalibrationError
@@ -59,10 +60,10 @@ if TYPE_CHECKING:
     from orthoscope.targets.detections import Detections as Detections
     from orthoscope.targets.detections import Outlier as Outlier
     from orthoscope.targets.detections import SetAside as SetAside
-    from orthoscope.targets.detections import Target as Target
     from orthoscope.targets.detections import View as View
-    from orthoscope.targets.detections import chessboard as chessboard
-    from orthoscope.targets.detections import parse_target as parse_target
+    from orthoscope.targets.table import parse_target as parse_target
+    from orthoscope.targets.target import Target as Target
+    from orthoscope.targets.target import chessboard as chessboard
 
 ROOMS = {
     "detection.detect": ("detect",),
@@ -75,7 +76,7 @@ ROOMS = {
     "fitting.resection": ("resect",),
     "formats.export": ("export",),
     "formats.load": ("load_camera",),
-    "formats.own.json": ("load", "load_calibration", "load_detections", "save"),
+    "formats.own.json": ("load", "load_calibration", "load_detections", "load_evaluation", "save"),
     "formats.table": ("FORMATS",),
     "geometry.arrays": ("CalibrationError", "InputError"),
     "geometry.pose": ("Pose",),
@@ -89,15 +90,9 @@ ROOMS = {
     "simulation.render": ("render",),
     "simulation.scene": ("Scene", "random_views", "simulate_detections"),
     "straight.undistort": ("undistort",),
-    "targets.detections": (
-        "Detections",
-        "Outlier",
-        "SetAside",
-        "Target",
-        "View",
-        "chessboard",
-        "parse_target",
-    ),
+    "targets.detections": ("Detections", "Outlier", "SetAside", "View"),
+    "targets.table": ("parse_target",),
+    "targets.target": ("Target", "chessboard"),
 }
 _ROOM_OF = {name: room for room, names in ROOMS.items() for name in names}
 

@@ -24,7 +24,7 @@ Example:
   target     free: corners 0.12 mm rms from where they are said to be, 0.37 mm from the lowest to the highest
   choice     target free, lens free; next target free, lens brown loses 0.004 px held out
   verdict    0.09 ± 0.01 px on photographs that were not used (0.07 px on those that were); it holds over 71 % of the frame.
-  wrote      camera/detections.json, camera/calibration.json, camera/report.html
+  wrote      camera/detections.json, camera/calibration.json, camera/evaluation.json, camera/report.html
 
 \b
 PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
@@ -92,11 +92,12 @@ def calibrate_into(
     """The main job; prints the summary and returns the evaluation."""
     from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.inputs import detections_from
+    from orthoscope.cli.judged import EVALUATION
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
+    from orthoscope.cli.summary import evaluation_lines
     from orthoscope.evaluation.evaluate import evaluate
     from orthoscope.files.whole_files import check_folder
-    from orthoscope.formats.own.json import save
+    from orthoscope.formats.own.json import save, text_of
     from orthoscope.methods import calibrate as run
     from orthoscope.methods import settings_of
 
@@ -116,8 +117,9 @@ def calibrate_into(
         calibration = run(detections, method=method, **given, **told)
     with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
         evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
-    save(calibration, out / "calibration.json")
-    written.append(out / "calibration.json")
+    for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION)):
+        save(thing, out / name)
+        written.append(out / name)
     if export:
         written += _write_for(export, calibration, out)
     if report:
@@ -125,7 +127,7 @@ def calibrate_into(
     if undistort:
         written.append(_write_straight(evaluation, files, out, keep=keep, jobs=jobs, cluster=cluster))
     if as_json:
-        click.echo(to_json(evaluation_numbers(evaluation)))
+        click.echo(text_of(evaluation), nl=False)
     else:
         click.echo("\n".join([*evaluation_lines(evaluation), "wrote      " + ", ".join(map(str, written))]))
     return evaluation

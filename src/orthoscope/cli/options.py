@@ -18,6 +18,7 @@ __all__ = [
     "camera_file",
     "cluster",
     "folds",
+    "folds_anew",
     "image_size",
     "jobs",
     "keep",
@@ -192,6 +193,11 @@ folds: Decorator = click.option(
     show_default=True,
     type=click.IntRange(2),
     help="Parts that the views are held out in.",
+)
+folds_anew: Decorator = click.option(
+    "--folds",
+    type=click.IntRange(2),
+    help="Judge anew, holding the views out in so many parts, though an evaluation.json is at hand.",
 )
 jobs: Decorator = click.option(
     "--jobs",

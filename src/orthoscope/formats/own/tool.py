@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from orthoscope.formats.own.json import camera_in, written
+from orthoscope.formats.own.json import camera_in, text_of
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document
 from orthoscope.models.lenses import FREE, LENSES
@@ -27,7 +27,7 @@ def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str
 
 
 def _write(contents: Contents, place: Path) -> Files:
-    return {place: written(contents.camera, place)}
+    return {place: text_of(contents.camera)}
 
 
 ORTHOSCOPE = Format(
