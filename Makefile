@@ -8,7 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test quick check format lint types rooms picture bench bench-peers clean
+.PHONY: release-check demo test quick check format lint types rooms picture bench bench-peers clean
 
 demo: $(VENV)/installed
 	$(BIN)/orthoscope demo -o demo
@@ -49,6 +49,15 @@ bench-peers:
 	benchmarks/.peers/lensboy/bin/pip install --quiet lensboy "opencv-contrib-python<5"
 	$(PYTHON) -m venv benchmarks/.peers/discorpy
 	benchmarks/.peers/discorpy/bin/pip install --quiet discorpy
+
+release-check: $(VENV)/installed
+	$(BIN)/pip install --quiet build twine
+	rm -rf dist build/bare
+	$(BIN)/python -m build --quiet --outdir dist
+	$(BIN)/twine check --strict dist/*
+	$(PYTHON) -m venv build/bare
+	build/bare/bin/pip install --quiet dist/*.whl
+	cd build && bare/bin/python ../tests/helpers/run_readme.py ../README.md
 
 clean:
 	rm -rf $(VENV) demo

@@ -12,13 +12,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.laws import FREE_LENSES_TO_TRY, displaced
-from orthoscope.formats.export import EXPORTERS, export, exportable, opencv_coefficients
+from orthoscope.formats.export import EXPORTERS, export, exportable
 from orthoscope.formats.opencv import read_opencv
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.difference import frame_grid
 from orthoscope.models.lenses import LENSES, Brown, Division, Fov, KannalaBrandt, Rational
+from orthoscope.models.opencv_order import opencv_coefficients
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import chessboard
 

@@ -39,6 +39,10 @@ class Uncertainty:
             self, "covariance", frozen(np.reshape(self.covariance, (k, k)), (k, k), "covariance")
         )
 
+    def __repr__(self) -> str:
+        told = (f"{name} {deviation:.2g}" for name, deviation in self.deviations.items())
+        return f"Uncertainty({', '.join(told)})"
+
     @property
     def deviations(self) -> dict[str, float]:
         """The standard deviation of each estimated parameter."""
@@ -109,6 +113,12 @@ class Calibration:
                 f"{len(self.camera_from_target)} poses for {len(self.detections.views)} views; expected one"
                 " for each."
             )
+
+    def __repr__(self) -> str:
+        return (
+            f"Calibration({self.method}, rms {self.rms_px:.3g} px, target {self.target_shape.kind})\n"
+            f"  {self.camera!r}\n  {self.detections!r}"
+        )
 
     def residuals(self) -> tuple[Float[ndarray, "_ 2"], ...]:
         """Predicted minus detected, pixels, an array (n,2) for each view; the formula's own value where its

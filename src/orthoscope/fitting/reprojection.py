@@ -236,7 +236,7 @@ def _set_parameter(
     frame: Intrinsics,
     by_lens: dict[str, tuple[ndarray, ndarray]],
 ) -> None:
-    """Writes d(u, v) by a parameter, or by those that are tied in a group, into the two halves of a column."""
+    """Writes d(u, v) by a parameter, or by those tied in a group, into the two halves of a column."""
     first, *others = (_slopes(name, at, frame, by_lens) for name in group.split("="))
     u[...], v[...] = first
     for by_u, by_v in others:

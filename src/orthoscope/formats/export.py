@@ -27,11 +27,9 @@ from orthoscope.models.difference import frame_grid
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import Brown, Fov, KannalaBrandt, Rational, lens_name
+from orthoscope.models.opencv_order import opencv_coefficients
 
-__all__ = ["EXPORTERS", "OPENCV_ORDER", "Exportable", "export", "exportable", "opencv_coefficients"]
-
-OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
-LENGTHS = (5, 8, 12, 14)
+__all__ = ["EXPORTERS", "Exportable", "export", "exportable"]
 
 
 class _Model(NamedTuple):
@@ -99,15 +97,6 @@ def exportable(camera: Camera, format_name: str, *, made_from: Calibration | Non
     apart = np.hypot(*(other.project(rays) - camera.project(rays)).T)
     where = "over the frame" if made_from is None else "where corners were seen"
     return Exportable(other, float(apart.mean()), float(apart.max()), where)
-
-
-def opencv_coefficients(lens: Brown | Rational) -> list[float]:
-    """The coefficients in OpenCV's order: as few of 5, 8, 12 or 14 as hold them all."""
-    known = dict(zip(lens.names(), lens.coefficients.tolist(), strict=True))
-    values = [known.get(name, 0.0) for name in OPENCV_ORDER]
-    used = max((i + 1 for i, value in enumerate(values) if value), default=0)
-    shortest = 8 if isinstance(lens, Rational) else 5
-    return values[: next(length for length in LENGTHS if length >= max(used, shortest))]
 
 
 def _opencv(camera: Camera) -> str:

@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 
 from orthoscope.files.whole_files import read_text
-from orthoscope.formats.export import OPENCV_ORDER
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
+from orthoscope.models.opencv_order import OPENCV_ORDER
 
 __all__ = ["read_opencv"]
 

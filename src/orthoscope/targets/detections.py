@@ -56,6 +56,9 @@ class Target:
             raise InputError(f"target {self.name!r} has a line through a corner that it does not have.")
         object.__setattr__(self, "lines", lines)
 
+    def __repr__(self) -> str:
+        return f"Target({self.name!r}, {len(self.points)} corners)"
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -81,6 +84,9 @@ class View:
             )
         object.__setattr__(self, "ids", ids)
         object.__setattr__(self, "pixels", pixels)
+
+    def __repr__(self) -> str:
+        return f"View({self.image!r}, {len(self.ids)} corners)"
 
 
 class SetAside(NamedTuple):
@@ -137,6 +143,12 @@ class Detections:
                     f"view {view.image!r} has corner {int(view.ids.max())}; target {self.target.name!r} has"
                     f" corners 0 to {len(self.target.points) - 1}. Name the target that was photographed."
                 )
+
+    def __repr__(self) -> str:
+        width, height = self.image_size
+        aside = f", {len(self.set_aside)} set aside" if self.set_aside else ""
+        seen = f"{len(self.views)} views of {width}x{height}, {self.corners} corners"
+        return f"Detections({self.target.name}, {seen}{aside})"
 
     @property
     def corners(self) -> int:
