@@ -59,10 +59,10 @@ if TYPE_CHECKING:
     from orthoscope.targets.detections import Detections as Detections
     from orthoscope.targets.detections import Outlier as Outlier
     from orthoscope.targets.detections import SetAside as SetAside
-    from orthoscope.targets.detections import Target as Target
     from orthoscope.targets.detections import View as View
-    from orthoscope.targets.detections import chessboard as chessboard
-    from orthoscope.targets.detections import parse_target as parse_target
+    from orthoscope.targets.table import parse_target as parse_target
+    from orthoscope.targets.target import Target as Target
+    from orthoscope.targets.target import chessboard as chessboard
 
 ROOMS = {
     "detection.detect": ("detect",),
@@ -94,15 +94,9 @@ ROOMS = {
     "simulation.render": ("render",),
     "simulation.scene": ("Scene", "random_views", "simulate_detections"),
     "straight.undistort": ("undistort",),
-    "targets.detections": (
-        "Detections",
-        "Outlier",
-        "SetAside",
-        "Target",
-        "View",
-        "chessboard",
-        "parse_target",
-    ),
+    "targets.detections": ("Detections", "Outlier", "SetAside", "View"),
+    "targets.table": ("parse_target",),
+    "targets.target": ("Target", "chessboard"),
 }
 _ROOM_OF = {name: room for room, names in ROOMS.items() for name in names}
 

@@ -20,7 +20,8 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import random_views
-from orthoscope.targets.detections import Detections, Target, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target, chessboard
 
 BOARD = chessboard(9, 6, 0.025)
 CAMERAS = {

@@ -21,7 +21,7 @@ from orthoscope.models.difference import frame_grid
 from orthoscope.models.lenses import LENSES, Brown, Division, Fov, KannalaBrandt, Rational
 from orthoscope.models.opencv_order import opencv_coefficients
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import chessboard
+from orthoscope.targets.target import chessboard
 
 SIZE = (640, 480)
 INTRINSICS = Intrinsics(500.0 + 1 / 3, 501.25, 319.5, 1e-5)

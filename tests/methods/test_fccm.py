@@ -46,7 +46,8 @@ from orthoscope.models.lenses import (
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import solve
 from orthoscope.solve.losses import Linear
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 FINE = chessboard(14, 10, 0.016)
 DENSE = simulate_detections(

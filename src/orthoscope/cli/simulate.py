@@ -105,7 +105,7 @@ def simulate(
     from orthoscope.files.whole_files import check_folder
     from orthoscope.formats.own.json import save
     from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-    from orthoscope.targets.detections import parse_target
+    from orthoscope.targets.table import parse_target
 
     check_folder(out)
     rng = np.random.default_rng(seed)

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +22,10 @@ import numpy as np
 from orthoscope.detection.chessboard import board_size, find_chessboard
 from orthoscope.files.images import names_of, photographs, read_image
 from orthoscope.geometry.arrays import CalibrationError, InputError, ndarray
-from orthoscope.targets.detections import Detections, SetAside, Target, View, parse_target
+from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.table import parse_target
+from orthoscope.targets.target import Target
 
 __all__ = ["DETECTORS", "detect"]
 
@@ -92,8 +96,7 @@ def detect(
 
 
 def _detect_chessboard(grey: ndarray, target: Target) -> tuple[ndarray, ndarray] | None:
-    assert target.grid is not None
-    corners = find_chessboard(grey, *target.grid)
+    corners = find_chessboard(grey, *target.grid) if target.grid else None
     return None if corners is None else (np.arange(len(corners)), corners)
 
 
@@ -101,13 +104,12 @@ DETECTORS: dict[str, Detector] = {"chessboard": _detect_chessboard}
 
 
 def _detector_for(target: Target) -> Detector:
-    kind = target.name.partition(":")[0]
-    if kind not in DETECTORS:
+    if target.kind not in DETECTORS:
         raise InputError(
             f"target {target.name!r} cannot be looked for in photographs; expected one of"
             f" {', '.join(DETECTORS)}. Hand in corners instead."
         )
-    return DETECTORS[kind]
+    return DETECTORS[target.kind]
 
 
 def _look(file: Path, target: Target, detector: Detector) -> _Look:
@@ -173,22 +175,20 @@ def _nothing_found(
     if not readable:
         return f"none of {len(files)} photographs can be read; expected images. Look at them:{reasons}"
     told = f"{target.name} was found in none of {len(readable)} photographs; expected it in most of them."
-    if board := _board_instead(readable, target):
+    if isinstance(target.board, Chessboard) and (board := _board_instead(readable, target.board)):
         columns, rows = board
         return (
             f"{told} There seems to be a board of {columns}x{rows} inner corners in"
             f" {readable[0].name if len(readable) == 1 else 'them'}: if that is the one, say --target"
-            f" chessboard:{columns}x{rows}:{target.name.rpartition(':')[2]}."
+            f" {replace(target.board, columns=columns, rows=rows).description}."
         )
-    return (
-        f"{told} Count its inner corners (one fewer than squares, each way), and see that it is whole, sharp"
-        f" and lit:{reasons}"
-    )
+    advice = target.board.advice if target.board else "See that it is whole, sharp and lit"
+    return f"{told} {advice}:{reasons}"
 
 
-def _board_instead(files: list[Path], target: Target) -> tuple[int, int] | None:
+def _board_instead(files: list[Path], target: Chessboard) -> tuple[int, int] | None:
     """The size of the board that most of a few photographs show, where it is not the target's."""
-    columns, rows = target.grid or (0, 0)
+    columns, rows = target.grid
     near = [
         (columns + i, rows + j) for i, j in ((-1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1), (-2, -2))
     ]

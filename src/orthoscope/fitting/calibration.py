@@ -16,7 +16,8 @@ from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
-from orthoscope.targets.detections import Detections, Target
+from orthoscope.targets.detections import Detections
+from orthoscope.targets.target import Target
 
 __all__ = ["Calibration", "Candidate", "Uncertainty", "points_of", "residuals_of", "rms"]
 

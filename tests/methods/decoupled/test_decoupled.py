@@ -34,7 +34,8 @@ from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import Brown, Division
 from orthoscope.models.target_shape import without_similarity
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, chessboard
+from orthoscope.targets.detections import Detections
+from orthoscope.targets.target import chessboard
 
 BOTH = bowed(1e-3) + stretched(0.01) + drawn((2e-4, 2e-4, 2e-4))
 SHAPES = {

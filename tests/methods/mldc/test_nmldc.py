@@ -26,7 +26,8 @@ from orthoscope.models.lenses import Brown, Division, Fet, Fov, KannalaBrandt, P
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import solve
 from orthoscope.solve.losses import Linear
-from orthoscope.targets.detections import Detections, Target, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target, chessboard
 
 SIZE = (640, 480)
 BOARD = chessboard(14, 10, 0.02)

@@ -18,7 +18,8 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
 from orthoscope.models.lenses import Rational
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, SetAside, Target, View, chessboard
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.target import Target, chessboard
 
 Spoil = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 

@@ -24,7 +24,11 @@ from orthoscope.models.lenses import LENSES
 from orthoscope.models.spline import Displacement, Lattice
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.simulation.scene import Scene
-from orthoscope.targets.detections import Detections, Outlier, SetAside, Target, View
+from orthoscope.targets.board import Board
+from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.detections import Detections, Outlier, SetAside, View
+from orthoscope.targets.table import TARGETS, as_fields
+from orthoscope.targets.target import Target
 
 __all__ = ["CalibrationFile", "CameraFile", "DetectionsFile", "SceneFile"]
 
@@ -36,17 +40,27 @@ class TargetFile(FileStruct, kw_only=True):
     grid: tuple[int, int] | None = None
     points: list[tuple[float, float, float]]
     lines: list[list[int]] = []
+    board: dict[str, Any] | None = None  # a chessboard is known by its grid
 
     @classmethod
     def of(cls, target: Target) -> TargetFile:
         lines = [line.tolist() for line in target.lines]
-        return cls(name=target.name, grid=target.grid, points=target.points.tolist(), lines=lines)
+        board = None if target.board is None or target.kind == Chessboard.kind else as_fields(target.board)
+        return cls(
+            name=target.name, grid=target.grid, points=target.points.tolist(), lines=lines, board=board
+        )
 
     def core(self) -> Target:
         points = np.array(self.points, dtype=float).reshape(-1, 3)
-        return Target(
-            self.name, points, tuple(np.array(line, dtype=np.int64) for line in self.lines), self.grid
-        )
+        lines = tuple(np.array(line, dtype=np.int64) for line in self.lines)
+        return Target(self.name, points, lines, self.grid, _board(self.board) if self.board else None)
+
+
+def _board(fields: dict[str, Any]) -> Board:
+    kind, rest = fields.get("kind"), {name: value for name, value in fields.items() if name != "kind"}
+    if kind not in TARGETS:
+        raise InputError(f"a target of kind {kind!r} is not known; expected one of {', '.join(TARGETS)}.")
+    return msgspec.convert(rest, TARGETS[kind])
 
 
 class ViewFile(FileStruct):

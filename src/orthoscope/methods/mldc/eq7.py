@@ -36,7 +36,7 @@ from orthoscope.geometry.projective import cross_ratio, cross_ratio_slope, fitte
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 
 __all__ = ["CorrectedPoints", "Eq7"]
 

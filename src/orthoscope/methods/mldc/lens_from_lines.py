@@ -28,7 +28,7 @@ from orthoscope.models.charts import EQUIDISTANT
 from orthoscope.models.lens import Formula
 from orthoscope.solve.least_squares import Options, Solution, shared_covariance, solve
 from orthoscope.solve.losses import Cauchy, Linear, Loss
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 
 __all__ = ["StraightLens", "fit_straight_lens"]
 
