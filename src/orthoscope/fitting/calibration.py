@@ -15,6 +15,7 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
+from orthoscope.models.parameters import Parameters
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 from orthoscope.targets.target import Target
@@ -50,8 +51,8 @@ class Uncertainty:
         roots = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return {
             single: float(root)
-            for name, root in zip(self.names, roots, strict=True)
-            for single in name.split("=")
+            for tied, root in zip(Parameters.of(self.names).groups, roots, strict=True)
+            for single in tied
         }
 
 

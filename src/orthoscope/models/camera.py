@@ -8,6 +8,7 @@ centre.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,8 @@ from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.models.chunks import in_blocks
 from orthoscope.models.lens import Lens
 from orthoscope.models.opencv_order import opencv_distortion
+from orthoscope.models.parameters import Parameters
+from orthoscope.models.pixel_slopes import PixelSlopes
 from orthoscope.models.smooth_map import smooth_map
 
 __all__ = ["WIDEST", "Camera", "Intrinsics", "image_border"]
@@ -124,6 +127,15 @@ class Camera:
             what = "distortion centre of its own" if self.lens_frame else "skew"
             raise InputError(f"OpenCV has no {what}, and this camera has one. Calibrate without it.")
         return self.K, np.array(opencv_distortion(self.lens))
+
+    def linearise(self, points: Iterable[ndarray], free: Parameters | Iterable[str] = ()) -> PixelSlopes:
+        """Pixels of points and their slopes by point and parameter; the formula goes on beyond its domain.
+
+        Args:
+            points: X, Y and Z in the camera frame, arrays of one shape, any unit.
+            free: parameters whose slopes are wanted, as models/parameters.py names them.
+        """
+        return PixelSlopes(self, points, Parameters.of(free))
 
     def project(self, points: ArrayLike, *, beyond: bool = False) -> ndarray:
         """Pixels of points in the camera frame; NaN where the lens gives them no image.

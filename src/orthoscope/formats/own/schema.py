@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
