@@ -33,12 +33,13 @@ if TYPE_CHECKING:
     from orthoscope.fitting.held_out import held_out as held_out
     from orthoscope.fitting.resection import resect as resect
     from orthoscope.formats.export import export as export
+    from orthoscope.formats.load import load_camera as load_camera
     from orthoscope.formats.own.json import load as load
     from orthoscope.formats.own.json import load_calibration as load_calibration
-    from orthoscope.formats.own.json import load_camera as load_camera
     from orthoscope.formats.own.json import load_detections as load_detections
     from orthoscope.formats.own.json import load_evaluation as load_evaluation
     from orthoscope.formats.own.json import save as save
+    from orthoscope.formats.table import FORMATS as FORMATS
     from orthoscope.geometry.arrays import CalibrationError as CalibrationError
     from orthoscope.geometry.arrays import InputError as InputError
     from orthoscope.geometry.pose import Pose as Pose
@@ -74,14 +75,9 @@ ROOMS = {
     "fitting.held_out": ("held_out",),
     "fitting.resection": ("resect",),
     "formats.export": ("export",),
-    "formats.own.json": (
-        "load",
-        "load_calibration",
-        "load_camera",
-        "load_detections",
-        "load_evaluation",
-        "save",
-    ),
+    "formats.load": ("load_camera",),
+    "formats.own.json": ("load", "load_calibration", "load_detections", "load_evaluation", "save"),
+    "formats.table": ("FORMATS",),
     "geometry.arrays": ("CalibrationError", "InputError"),
     "geometry.pose": ("Pose",),
     "methods": ("METHODS", "calibrate"),

@@ -60,10 +60,10 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 )
 @click.option(
     "--export",
-    metavar="TOOL",
+    type=options.TOOL,
     help=(
-        "Also write the camera for opencv, ros or kalibr, into OUT/camera-TOOL.yaml; --lens auto then takes a"
-        " lens that the tool has."
+        "Also write the camera for a tool (`orthoscope tools` lists them), into OUT/camera-TOOL; --lens auto then"
+        " takes a lens that the tool has."
     ),
 )
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
@@ -130,7 +130,7 @@ def calibrate_into(
         save(thing, out / name)
         written.append(out / name)
     if export:
-        written.append(_write_for(export, calibration, out))
+        written += _write_for(export, calibration, out)
     if report:
         written.append(_write_report(evaluation, files, out, keep=keep, jobs=jobs))
     if undistort:
@@ -146,20 +146,20 @@ def _lenses_of(tool: str | None) -> tuple[str, ...]:
     """The lenses that a tool has; none where no tool is named."""
     if tool is None:
         return ()
-    from orthoscope.formats.export import EXPORTERS
-    from orthoscope.geometry.arrays import InputError
+    from orthoscope.formats.table import tool as record
 
-    if tool not in EXPORTERS:
-        raise InputError(f"no file for {tool!r} can be written; expected one of {', '.join(EXPORTERS)}.")
-    return EXPORTERS[tool].lenses
+    return record(tool).lenses
 
 
-def _write_for(tool: str, calibration: Any, out: Path) -> Path:
-    from orthoscope.formats.export import export, exportable
+def _write_for(tool: str, calibration: Any, out: Path) -> list[Path]:
+    """Write the camera for a tool, and say what that costs."""
+    from orthoscope.formats.export import export
+    from orthoscope.formats.table import FORMATS
 
-    path = out / f"camera-{tool}.yaml"
-    export(exportable(calibration.camera, tool, made_from=calibration).camera, path, tool)
-    return path
+    exported = export(calibration, out / f"camera-{tool}{FORMATS[tool].suffixes[0]}", tool, anyway=True)
+    for remark in exported.remarks():
+        click.echo(f"{tool:<10} {remark}", err=True)
+    return list(exported.files)
 
 
 def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None) -> Path:

@@ -1,15 +1,17 @@
 """The camera in the words of the tool that it is used with next, to be copied from the page.
 
-A lens that a tool does not have is given as the nearest formula that it has, with what that costs. Where that
-would be more than the calibration itself is off, the page says so.
+A lens that a tool does not have is given as the nearest that it has, with what that costs.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.formats.export import EXPORTERS, exportable
+from orthoscope.formats.export import Exportable, exportable
+from orthoscope.formats.record import Contents, shifted
+from orthoscope.formats.table import tool as record_of
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.numbers import pixels
 from orthoscope.models.camera import Camera
@@ -17,7 +19,8 @@ from orthoscope.models.lenses import KannalaBrandt
 
 __all__ = ["Snippet", "snippets"]
 
-TOOLS = {"opencv": "OpenCV", "ros": "ROS"}  # of EXPORTERS, as they call themselves
+TOOLS = {"opencv": "OpenCV", "ros": "ROS"}  # of FORMATS, as they call themselves
+OWN = 'import orthoscope\n\ncamera = orthoscope.load_camera("calibration.json")\n'
 
 
 class Snippet(NamedTuple):
@@ -36,30 +39,28 @@ class Snippet(NamedTuple):
 
 def snippets(calibration: Calibration) -> list[Snippet]:
     """For OpenCV, ROS and Python, in this order."""
-    told = [_of_tool(calibration, name, title) for name, title in TOOLS.items()]
-    return [*told, _python(calibration)]
+    told, held = [], {}
+    for name, title in TOOLS.items():
+        try:
+            held[name] = exportable(calibration.camera, name, made_from=calibration)
+            told.append(Snippet(title, _file(name, held[name].camera), _cost(held[name])))
+        except (InputError, CalibrationError) as error:
+            told.append(Snippet(title, "", str(error)))
+    found = held.get("opencv")
+    python = Snippet("Python", _arrays(found.camera), _cost(found)) if found else Snippet("Python", OWN)
+    return [*told, python]
 
 
-def _of_tool(calibration: Calibration, name: str, title: str) -> Snippet:
-    try:
-        found = exportable(calibration.camera, name, made_from=calibration)
-        return Snippet(title, EXPORTERS[name].text(found.camera), _cost(found.apart_px, found.farthest_px))
-    except (InputError, CalibrationError) as error:
-        return Snippet(title, "", str(error))
-
-
-def _python(calibration: Calibration) -> Snippet:
-    """K and the coefficients as arrays, in OpenCV's order where OpenCV has the lens; else by our own package."""
-    try:
-        found = exportable(calibration.camera, "opencv", made_from=calibration)
-        text = _arrays(found.camera)
-    except (InputError, CalibrationError):
-        text = 'import orthoscope\n\ncamera = orthoscope.load_camera("calibration.json")\n'
-        return Snippet("Python", text)
-    return Snippet("Python", text, _cost(found.apart_px, found.farthest_px))
+def _file(name: str, camera: Camera) -> str:
+    """What the tool's usual file would hold."""
+    record = record_of(name)
+    path = Path(f"camera{record.suffixes[0]}")
+    content = record.write(Contents(shifted(camera, record.pixel_origin)), path)[path]
+    return content if isinstance(content, str) else content.decode()
 
 
 def _arrays(camera: Camera) -> str:
+    """K and the coefficients as cv2 takes them."""
     K, dist = camera.opencv()
     rows = ",\n              ".join(str(row) for row in K.tolist())
     fisheye = ".fisheye" if isinstance(camera.lens, KannalaBrandt) else ""
@@ -70,10 +71,10 @@ def _arrays(camera: Camera) -> str:
     )
 
 
-def _cost(apart_px: float, farthest_px: float) -> str:
-    if not apart_px > 0.0:
+def _cost(held: Exportable) -> str:
+    if not held.lacks:
         return ""
     return (
-        f"The nearest formula that this tool has; {pixels(apart_px)} px off on average where corners were"
-        f" seen, {pixels(farthest_px)} px at most."
+        f"The nearest that this tool can hold: {pixels(held.apart_px)} px off on average where corners were"
+        f" seen, {pixels(held.farthest_px)} px at most."
     )

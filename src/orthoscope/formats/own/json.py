@@ -29,7 +29,16 @@ if TYPE_CHECKING:
     from orthoscope.evaluation.comparison.compare import Comparison
     from orthoscope.evaluation.evaluate import Evaluation
 
-__all__ = ["load", "load_calibration", "load_camera", "load_detections", "load_evaluation", "save", "text_of"]
+__all__ = [
+    "camera_in",
+    "load",
+    "load_calibration",
+    "load_camera",
+    "load_detections",
+    "load_evaluation",
+    "save",
+    "text_of",
+]
 
 FORMAT = 1
 KINDS = {  # what a file says it is: the type in memory, the schema on disk and where that stands
@@ -100,7 +109,12 @@ def load(path: str | Path) -> Any:
         InputError: the file is missing, cut off, of another program or of a newer version, has values that
             cannot be, or is an evaluation of another calibration than the one beside it.
     """
-    content = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
+    return _loaded(read_bytes(path), path)
+
+
+def _loaded(content: bytes, path: str | Path) -> Any:
+    """What the bytes of a file of ours hold; errors as `load`."""
+    content = content.removeprefix(b"\xef\xbb\xbf")
     kind = _kind(content, path)
     judged = [load_calibration(Path(path).with_name(CALIBRATION))] if kind == "evaluation" else []
     return _thing(content, kind, path, judged)
@@ -110,7 +124,7 @@ def _thing(content: bytes, kind: str, path: str | Path, judged: Sequence[Calibra
     """What such content means; for an evaluation with the calibration that it judges."""
     try:
         return msgspec.json.decode(content, type=_document(kind)).core(*judged)
-    except (msgspec.ValidationError, InputError) as error:
+    except (msgspec.ValidationError, InputError, OverflowError) as error:
         what = str(error).rstrip(".")
         raise InputError(
             f"{path} does not hold proper {kind} data: {what}. Mend that place or write the file again."
@@ -147,7 +161,12 @@ def load_evaluation(path: str | Path, calibration: Calibration | None = None) ->
 
 def load_camera(path: str | Path) -> Camera:
     """The camera of a file, also out of a calibration or a scene; errors as `load`."""
-    thing = load(path)
+    return camera_in(read_bytes(path), path)
+
+
+def camera_in(content: bytes, path: str | Path) -> Camera:
+    """The camera in the bytes of a file of ours; errors as `load`."""
+    thing = _loaded(content, path)
     return _expect(Camera, thing.camera if isinstance(thing, Calibration | Scene) else thing, path)
 
 
@@ -173,6 +192,8 @@ def _kind(content: bytes, path: str | Path) -> str:
         header = msgspec.json.decode(content, type=_Header)
     except msgspec.ValidationError as error:
         raise InputError(_foreign(path)) from error
+    except RecursionError as error:
+        raise InputError(f"{path} nests without end; expected a file that orthoscope wrote.") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise InputError(_malformed(content, path, error)) from error
     if header.format > FORMAT:
