@@ -38,7 +38,7 @@ def tag(name: str, /, *content: Content, **attributes: str | int | bool | None) 
         attributes: `class_` is class, `data_view` data-view; True stands alone, False and None are left out.
     """
     told = "".join(
-        f" {key.rstrip('_').replace('_', '-')}" + ("" if value is True else f'="{escape(str(value))}"')
+        f" {key.rstrip('_').replace('_', '-')}" + ("" if value is True else f'="{_quoted(str(value))}"')
         for key, value in attributes.items()
         if value is not None and value is not False
     )
@@ -55,6 +55,10 @@ def table(
     ]
     head = [tag("th", heading, scope="col") for heading in headings]
     return tag("table", tag("thead", tag("tr", head)) if head else None, tag("tbody", body), class_=class_)
+
+
+def _quoted(value: str) -> str:
+    return escape(value, quote=False).replace('"', "&quot;")
 
 
 def _joined(content: Iterable[Content]) -> str:

@@ -1,4 +1,4 @@
-"""Photographs that the user leaves out by name: they stay in detections.json and take no part in the camera."""
+"""Photographs that the user leaves out by name: they stay in detections.json and take no part."""
 
 from __future__ import annotations
 

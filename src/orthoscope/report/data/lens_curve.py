@@ -48,7 +48,7 @@ def curve(evaluation: Evaluation) -> dict[str, Any] | str:
 
 
 def angles_shown(camera: Camera, count: int) -> Float[ndarray, " a"]:
-    """From the axis to a little beyond the frame's farthest corner, radians; empty where no pixel has a ray."""
+    """From the axis to a little beyond the frame's corners, radians; empty where no pixel has a ray."""
     edge = _largest_angle(camera.unproject(_outline(camera)))
     if not np.isfinite(edge):
         return np.empty(0)

@@ -1,4 +1,4 @@
-"""Where the camera may be trusted: its predicted error over the frame, and the region where it stays small."""
+"""Where the camera may be trusted: its predicted error over the frame, and where that stays small."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Of each photograph: its corners, where the camera predicts them, the same held out, and the board's pose."""
+"""Of each photograph: its corners, where the camera predicts them, also held out, the board's pose."""
 
 from __future__ import annotations
 
