@@ -83,6 +83,7 @@ def test_one_that_cannot_is_told_with_the_reason_and_the_others_are_compared(run
     assert json.loads((tmp_path / "out/comparison.json").read_text())["standings"][1]["held_out_px"] is None
 
 
+@pytest.mark.slow
 def test_the_same_twice_gives_the_same_but_for_the_seconds(run, calibrated, tmp_path):
     for name in ("a", "b"):
         assert run("compare", calibrated / "detections.json", *THREE, "-o", tmp_path / name).code == 0

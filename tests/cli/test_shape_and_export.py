@@ -62,6 +62,7 @@ def test_a_method_that_takes_the_target_as_flat_refuses_a_shape(calibrate):
     assert "method 'fccm' has no setting 'target'" in told.err
 
 
+@pytest.mark.slow
 def test_for_a_tool_a_lens_that_it_has_is_chosen_and_written(calibrate):
     told, out = calibrate("--shape", "flat", "--export", "opencv")
     assert told.code == 0, told.err

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.target_laws import every_board
 from numpy.testing import assert_array_equal
 
+from helpers.target_laws import every_board
 from orthoscope.detection.detect import DETECTORS
 from orthoscope.detection.sight import Sight
 from orthoscope.geometry.pose import Pose, rotation_from_vector
@@ -81,7 +81,7 @@ def test_a_board_with_a_side_out_of_the_picture_is_found_as_far_as_it_is_in_it(b
         * (0.5 * BROWN.image_size[axis] - 0.27 * 700.0 * (high - low)[axis] / distance)
         / 700.0
     )
-    pose = Pose(rotation, aim + [0.0, 0.0, distance] - rotation @ np.array([*middle, 0.0]))
+    pose = Pose(rotation, [*aim, 0.0, 0.0, distance] - rotation @ np.array([*middle, 0.0]))
     sight, truth = seen(BROWNS, target, pose)
     check_ids(target, sight, truth)
     step = np.linalg.norm(np.diff(truth[target.lines[0][:2]], axis=0))

@@ -86,6 +86,7 @@ def test_the_usual_entrants_have_every_method_as_it_comes():
     assert [parse_entry(name).name for name in USUAL] == list(USUAL)
 
 
+@pytest.mark.slow
 def test_the_best_is_first_and_loses_nothing(comparison):
     errors = [standing.held_out_px for standing in comparison.standings]
     assert errors == sorted(errors)
