@@ -22,6 +22,7 @@ from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.models.lenses import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
 from orthoscope.solve.losses import LOSSES, Loss
@@ -45,6 +46,7 @@ LONG_WALK = 25  # steps; so many speak of a flat valley, and where corners are F
 FEW = 2000  # corners
 
 
+@with_one_thread
 def fccm(
     detections: Detections,
     *,

@@ -22,6 +22,7 @@ from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
 from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import InputError
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.methods.decoupled.fold_fits import FoldFit
 from orthoscope.methods.decoupled.model_selection import (
     Contender,
@@ -61,6 +62,7 @@ class _Plan(NamedTuple):
     formulas: tuple[str | None, ...]
 
 
+@with_one_thread
 def decoupled(
     detections: Detections,
     *,
