@@ -7,7 +7,7 @@ import pytest
 
 from helpers.made_up import IMAGES, NOISE, POINTS, curve, curves, ended
 from orthoscope.paper import claims_about_curves, claims_about_eq7
-from orthoscope.paper.claims import MAIN, Claim, Verdict, headline
+from orthoscope.paper.claims import MAIN, Claim, Verdict, main_headline
 from orthoscope.paper.entries import FCCM5
 
 
@@ -188,8 +188,8 @@ def test_the_headline_counts_only_the_main_claim():
         Claim("x", MAIN, verdict, "") for verdict in (Verdict.FAILS, Verdict.HOLDS, Verdict.PARTLY)
     )
     other = Claim("x", "something else", Verdict.HOLDS, "")
-    assert "does not hold: it stands in 0 of 2" in headline([fails, fails, other])
-    assert "holds in part: it stands in 1 of 2" in headline([fails, holds, other])
-    assert "holds: it stands in 2 of 2" in headline([holds, holds])
-    assert "holds in part: it stands in full in 0 and in part in 1 of 2" in headline([fails, partly])
-    assert "cannot be told" in headline([other])
+    assert "does not hold: it stands in 0 of 2" in main_headline([fails, fails, other])
+    assert "holds in part: it stands in 1 of 2" in main_headline([fails, holds, other])
+    assert "holds: it stands in 2 of 2" in main_headline([holds, holds])
+    assert "holds in part: it stands in full in 0 and in part in 1 of 2" in main_headline([fails, partly])
+    assert "cannot be told" in main_headline([other])

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["MAIN", "Claim", "Verdict", "headline", "share"]
+__all__ = ["MAIN", "Claim", "Verdict", "main_headline", "share"]
 
 MAIN = (
     "MLDC has a lower error on test data than FCCM, whose lens and pin-hole only compensate each other on"
@@ -45,7 +45,7 @@ def share(number: int, of: int) -> Verdict:
     return Verdict.HOLDS if number == of else Verdict.PARTLY if number else Verdict.FAILS
 
 
-def headline(claims: Sequence[Claim]) -> str:
+def main_headline(claims: Sequence[Claim]) -> str:
     """One sentence for the top of the page, from the claims that MLDC is the better one on test data (MAIN);
     others are passed over.
     """

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from orthoscope.paper.claims import headline
+from orthoscope.paper.claims import main_headline
 from orthoscope.paper.curves import curves_of
 from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
@@ -59,7 +59,7 @@ def documents(results: Results, files: Mapping[str, Path] | None = None) -> Docu
 
 
 def _headline(shown: list[FigureWithClaims]) -> str:
-    return headline([claim for exhibit in shown for claim in exhibit.claims])
+    return main_headline([claim for exhibit in shown for claim in exhibit.claims])
 
 
 def _table1(results: Results) -> str:

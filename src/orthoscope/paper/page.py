@@ -14,7 +14,7 @@ import numpy as np
 
 from orthoscope.geometry.numbers import ABSENT
 from orthoscope.methods import METHODS
-from orthoscope.paper.claims import Claim, Verdict, headline
+from orthoscope.paper.claims import Claim, Verdict, main_headline
 from orthoscope.paper.curves import curves_of
 from orthoscope.paper.entries import FCCM
 from orthoscope.paper.figures_with_claims import (
@@ -62,7 +62,7 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         test_views=TEST_VIEWS,
         splits=SPLITS,
         noise=PAPERS_NOISE,
-        headline=headline(every),
+        headline=main_headline(every),
         every=every,
         summary=_summary(every),
         counts=[
@@ -124,13 +124,17 @@ def _figure(exhibit: FigureWithClaims) -> dict[str, Any]:
 def _fig7(straightened: Straightened | None) -> dict[str, Any] | None:
     if straightened is None:
         return None
-    from orthoscope.report.figures import photograph_uri
+    from orthoscope.report.pictures import LARGE, LARGE_BYTES, picture_uri
 
     return {
         "name": straightened.name,
-        "photograph": photograph_uri(straightened.photograph),
+        "photograph": picture_uri(straightened.photograph, LARGE, LARGE_BYTES),
         "pictures": [
-            (name, None, picture) if isinstance(picture, str) else (name, photograph_uri(picture), "")
+            (
+                (name, None, picture)
+                if isinstance(picture, str)
+                else (name, picture_uri(picture, LARGE, LARGE_BYTES), "")
+            )
             for name, picture in straightened.pictures
         ],
     }
