@@ -177,10 +177,10 @@ def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: s
 def _write_straight(
     evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None
 ) -> Path:
-    from orthoscope.cli.undistort import straighten
-    from orthoscope.formats.own.json import save
+    from orthoscope.cli.undistort import straighten, write_beside
     from orthoscope.geometry.arrays import InputError
-    from orthoscope.straight.undistort import straight_camera
+    from orthoscope.straight.outputs import replace_outputs
+    from orthoscope.straight.views import straight_camera
 
     if not files:
         raise InputError(
@@ -189,6 +189,10 @@ def _write_straight(
         )
     calibration = evaluation.calibration
     paths = [files[view.image] for view in calibration.detections.views]
-    straighten(paths, calibration.camera, out / "undistorted", keep=keep, jobs=jobs, cluster=cluster)
-    save(straight_camera(calibration.camera, keep=keep), out / "undistorted/camera.json")
+    view = straight_camera(calibration.camera, keep=keep)
+    written, _ = straighten(
+        paths, calibration.camera, out / "undistorted", view=view, jobs=jobs, cluster=cluster
+    )
+    beside = write_beside(calibration.camera, view, out / "undistorted", maps=False)
+    replace_outputs(out / "undistorted", [*written, *beside], paths)
     return out / "undistorted"
