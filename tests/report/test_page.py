@@ -296,8 +296,8 @@ def test_what_was_tried_is_told_with_what_it_loses(pages, shaped):
     )
     assert free.loses == "taken"
     assert [one["name"] for one in data_of(pages["shaped"])["panels"]["choice"]["candidates"]] == [
-        "flat target, brown lens",
-        "free target, brown lens",
+        "flat target, brown",
+        "free target, brown",
     ]
     assert "difference" in data_of(pages["shaped"])["panels"]
     assert not {"choice", "difference"} & set(data_of(pages["misshapen"])["panels"])
