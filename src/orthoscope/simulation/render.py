@@ -38,10 +38,15 @@ MID_GREY = 128.0  # where `noise` is meant; half of its variance is read noise, 
 class Renderer:
     """A camera ready to photograph: what is the same in every photograph is computed once.
 
-    oversampling: sub-samples along a pixel's side where an edge crosses it. blur_px: sigma of the blur,
-    pixels. vignetting: share of the light that the farthest corner loses. noise: standard deviation at
-    mid-grey, grey levels. light: how much brighter one side is lit than the other, as a share. Raises
-    InputError for values out of range.
+    Args:
+        camera: which takes them.
+        oversampling: sub-samples along a pixel's side where an edge crosses it.
+        blur_px: sigma of the blur, pixels.
+        vignetting: share of the light that the farthest corner loses.
+        noise: standard deviation at mid-grey, grey levels.
+        light: how much brighter one side is lit than the other, as a share.
+    Raises:
+        InputError: values out of range.
     """
 
     camera: Camera
@@ -67,8 +72,13 @@ class Renderer:
     ) -> ndarray:
         """One photograph, (h,w) uint8; black where a pixel has no ray.
 
-        rng: where background, light and noise come from; without it the background is plain, the light even
-        and there is no noise. Raises InputError for a target that cannot be drawn.
+        Args:
+            target: what it shows.
+            camera_from_target: where that stands.
+            rng: where background, light and noise come from; without it the background is plain, the light
+                even and there is no noise.
+        Raises:
+            InputError: the target cannot be drawn.
         """
         sheet = Sheet(target.drawing(), black=BLACK, white=WHITE)
         image = (
