@@ -1,0 +1,248 @@
+"""Do the photographs agree on one camera?  A test of what each of them would have liked K to be.
+
+A lens that zooms or focuses between photographs, a stabiliser, a rolling shutter, two cameras in one folder: in each view
+the residuals then ask for another K.  With the fit linearised (fitting/linearised.py), C_j what a few changes of K do to
+the residuals of view j, its pose fitted, B_j what its own say in the fit explains, s2 the noise:
+
+    T_j = C_j'(I - B_j) C_j,    s_j = C_j'e_j,    the view's wish  kappa_j = -T_j^-1 s_j,
+    F = sum s_j'T_j^+ s_j / (s2 sum rank T_j)
+
+F is far above 1 on photographs that agree, since the errors of one view are alike (boards bend from view to view, and what
+bends is of the second order).  So it is divided by how far the views' residuals follow second-order patterns of the board
+that no change of K makes: tau, the same ratio for these patterns, C_j projected out.  F2 = F / max(1, tau) has Fisher's
+distribution where views agree but bend.  The fit must be the one with every corner free and a free lens: else the target's
+shape, which each view sees from another side, is taken for a camera that changes.
+
+How much the camera changes is the spread of the wishes without their noise: kappa_j ~ N(0, S), S by expectation
+maximisation, and the rms movement of the image that S makes, a rotation fitted out.  A shutter that reads row after row
+shears the image, which is no change of K, and is tested in the same way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.evaluation.difference import image_difference
+from orthoscope.evaluation.f_distribution import f_survival
+from orthoscope.fitting.leave_one_out import hat_of
+from orthoscope.fitting.linearised import Linearised
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.methods.reprojection import with_parameters
+from orthoscope.models.camera import Camera
+
+__all__ = ["Disagreement", "Wishes", "disagreement", "wishes"]
+
+STEP = 0.01  # of the focal length or of the image's width: a change of K that counts as 1
+FAINT = 1e-3  # of the largest: an eigenvalue of T_j below it is no wish
+OWN = 0.3  # singular value of a pattern, C_j projected out: below it the pattern is one that K makes too
+LARGE, SURE = 3.0, 1e-4  # F2 above, p below: views do not agree
+FEWEST_VIEWS = 5
+SPREADING = 60  # rounds of expectation maximisation
+SAMPLE = 300  # pixels at which an image's movement is looked at
+
+
+class Wishes(NamedTuple):
+    """What each of m views would have liked c changes of K to be.
+
+    Args:
+        kappa: (m,c) the wish, in the changes' own steps; 0 where the view has none.
+        told: (m,c,c) T_j over the noise and tau: the inverse of the wish's covariance.
+        f2: F over max(1, tau).
+        p_value: of f2.
+        tau: how alike errors within a view are.
+    """
+
+    kappa: Float[ndarray, "m c"]
+    told: Float[ndarray, "m c c"]
+    f2: float
+    p_value: float
+    tau: float
+
+    @property
+    def certain(self) -> bool:
+        """Whether the views surely differ."""
+        return self.f2 > LARGE and self.p_value < SURE
+
+    @property
+    def spread(self) -> Float[ndarray, "c c"]:
+        """Covariance of the wishes without their noise."""
+        return _spread(self.kappa, self.told)
+
+
+@dataclass(frozen=True, eq=False)
+class Disagreement:
+    """Whether photographs agree on one camera.
+
+    Args:
+        f2, p_value: of the test; NaN where the views do not suffice for one.
+        certain: whether they surely do not.
+        kind: what changes most between them: `zoom`, `centre`, `shutter`; empty where they agree.
+        by_px: how far the image moves from photograph to photograph, rms over the seen pixels and the photographs, after a rotation.
+        focal: standard deviation of the focal length over photographs, as a share of it.
+        centre_px: standard deviation of the principal point, pixels.
+        wishes: of scale, cx and cy.
+    """
+
+    f2: float
+    p_value: float
+    certain: bool
+    kind: str
+    by_px: float
+    focal: float
+    centre_px: float
+    wishes: Wishes | None
+
+
+AGREED = Disagreement(float("nan"), float("nan"), False, "", 0.0, 0.0, 0.0, None)
+
+
+def disagreement(fit: Linearised, points: Float[ndarray, "p 3"], pixels: Float[ndarray, "n 2"]) -> Disagreement:
+    """Whether the views of a fit agree on one camera.
+
+    Args:
+        fit: with every corner free and a free lens.
+        points: the target's corners, metres.
+        pixels: where corners were seen, in all views together.
+    """
+    names, changes = changes_of(fit)
+    if fit.views < FEWEST_VIEWS or len(names) < 3:
+        return AGREED
+    of_K = wishes(fit, points, fit.moves(changes))
+    of_shutter = wishes(fit, points, fit.without_pose(fit.root[..., None] * _shears(fit)))
+    if not (of_K.certain or of_shutter.certain):
+        return Disagreement(of_K.f2, of_K.p_value, False, "", 0.0, 0.0, 0.0, of_K)
+    spread = of_K.spread
+    by_px = _movement(fit, changes, spread, pixels)
+    kind = "shutter" if of_shutter.f2 > of_K.f2 else _kind(fit, changes, spread, pixels)
+    width = fit.camera.image_size[0]
+    return Disagreement(
+        f2=max(of_K.f2, of_shutter.f2),
+        p_value=min(of_K.p_value, of_shutter.p_value),
+        certain=True,
+        kind=kind,
+        by_px=by_px,
+        focal=STEP * float(np.sqrt(spread[0, 0])),
+        centre_px=STEP * width * float(np.sqrt(spread[1, 1] + spread[2, 2])),
+        wishes=of_K,
+    )
+
+
+def changes_of(fit: Linearised, more: tuple[str, ...] = ()) -> tuple[tuple[str, ...], Float[ndarray, "q c"]]:
+    """The changes of the camera that a view may wish for, as steps of a fit's unknowns, and their names.
+
+    Args:
+        more: names of coefficients beside scale, cx and cy, each with a step of its own size, where the fit has them.
+    """
+    K, width = fit.camera.intrinsics, fit.camera.image_size[0]
+    parts = [name.split("=") for name in fit.names]
+    scale = {i: STEP * getattr(K, part[0]) for i, part in enumerate(parts) if part[0] in ("fx", "fy")}
+    steps: dict[str, dict[int, float]] = {"scale": scale} if scale else {}
+    for name in ("cx", "cy"):
+        if [name] in parts:
+            steps[name] = {parts.index([name]): STEP * width}
+    steps |= {name: {parts.index([name]): STEP} for name in more if [name] in parts}
+    changes = np.zeros((fit.unknowns, len(steps)))
+    for column, step in enumerate(steps.values()):
+        changes[list(step), column] = list(step.values())
+    return tuple(steps), changes
+
+
+def wishes(fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]) -> Wishes:
+    """What the views wish, and whether the wishes differ.
+
+    Args:
+        points: the target's corners, metres.
+        moves: C_j, of weighted residuals with the pose of each view fitted.
+    """
+    told = _told(moves, hat_of(fit, moves))
+    score = (moves * fit.errors[..., None]).sum(1)
+    inverse, rank = _pseudo_inverse(told)
+    kappa = -(inverse @ score[..., None])[..., 0]
+    f = float((score * -kappa).sum() / (fit.noise * max(rank.sum(), 1)))
+    tau, freedom = _alike(fit, points, moves)
+    f2, tested = f / max(1.0, tau), float(rank.sum() - moves.shape[2])
+    p_value = f_survival(f2, tested, freedom) if tested > 0 and freedom > 0 else float("nan")
+    return Wishes(kappa, told / (fit.noise * max(1.0, tau)), f2, p_value, tau)
+
+
+def _told(moves: Float[ndarray, "m n c"], explained: Float[ndarray, "m n c"]) -> Float[ndarray, "m c c"]:
+    """T_j = C_j'(I - B_j) C_j."""
+    told = moves.transpose(0, 2, 1) @ (moves - explained)
+    return 0.5 * (told + told.transpose(0, 2, 1))
+
+
+def _pseudo_inverse(told: Float[ndarray, "m c c"]) -> tuple[Float[ndarray, "m c c"], Float[ndarray, " m"]]:
+    """T_j^+ and the ranks, faint directions left out; columns are scaled alike in all views first."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).max(0), 1e-300))
+    values, vectors = np.linalg.eigh(told * scale * scale[:, None])
+    strong = values > FAINT * max(values.max(), 1e-300)
+    inverse = (vectors * np.where(strong, 1.0 / np.where(strong, values, 1.0), 0.0)[:, None]) @ vectors.transpose(0, 2, 1)
+    return inverse * scale * scale[:, None], strong.sum(1).astype(float)
+
+
+def _alike(fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]) -> tuple[float, float]:
+    """tau of the second-order patterns that the changes do not make, and their degrees of freedom."""
+    x, y = (points[:, :2] - points[:, :2].mean(0)).T / max(float(np.ptp(points[:, :2])), 1e-300)
+    shapes, zero = np.stack([x * x, x * y, y * y], axis=1), np.zeros((len(points), 3))
+    patterns = np.block([[shapes, zero], [zero, shapes]])  # (2p, 6)
+    rows = fit.without_pose(fit.root[..., None] * patterns)
+    rows = rows / np.maximum(np.sqrt((rows**2).sum(1, keepdims=True)), 1e-300)
+    basis = np.linalg.qr(moves / np.maximum(np.sqrt((moves**2).sum(1, keepdims=True)), 1e-300))[0]
+    rows = rows - basis @ (basis.transpose(0, 2, 1) @ rows)
+    vectors, values, _ = np.linalg.svd(rows, full_matrices=False)
+    vectors = vectors * (values > OWN)[:, None]
+    freedom = float((vectors * (vectors - hat_of(fit, vectors))).sum())
+    energy = float(((vectors.transpose(0, 2, 1) @ fit.errors[..., None]) ** 2).sum())
+    return energy / (fit.noise * max(freedom, 1e-9)), freedom
+
+
+def _spread(kappa: Float[ndarray, "m c"], told: Float[ndarray, "m c c"]) -> Float[ndarray, "c c"]:
+    """Covariance S of kappa_j ~ N(0, S), each seen with covariance told_j^-1."""
+    heard = (told @ kappa[..., None])[..., 0]
+    spread = np.cov(kappa.T) + 1e-12 * np.eye(kappa.shape[1])
+    for _ in range(SPREADING):
+        posterior = np.linalg.inv(np.linalg.inv(spread) + told)
+        mean = (posterior @ heard[..., None])[..., 0]
+        spread = (mean[:, :, None] * mean[:, None] + posterior).mean(0)
+        spread += 1e-12 * np.trace(spread) * np.eye(len(spread))
+    return spread
+
+
+def _movement(fit: Linearised, changes: ndarray, spread: ndarray, pixels: Float[ndarray, "n 2"]) -> float:
+    """How far the image moves for changes of this covariance, rms over the pixels, after a rotation."""
+    values, vectors = np.linalg.eigh(spread)
+    squares = 0.0
+    for value, vector in zip(values, vectors.T, strict=True):
+        step = np.sqrt(max(float(value), 0.0)) * changes[: len(fit.names)] @ vector
+        squares += _moved_squared(fit.camera, fit.names, step, pixels)
+    return float(np.sqrt(squares))
+
+
+def _moved_squared(camera: Camera, names: tuple[str, ...], step: ndarray, pixels: ndarray) -> float:
+    sample = pixels[:: max(1, len(pixels) // SAMPLE)]
+    difference = image_difference(camera, with_parameters(camera, names, step), sample)
+    return float(np.nanmean((difference**2).sum(1)))
+
+
+def _kind(fit: Linearised, changes: ndarray, spread: ndarray, pixels: ndarray) -> str:
+    """Which change moves the image more, the focal length or the principal point."""
+    alone = np.zeros_like(spread)
+    alone[0, 0] = spread[0, 0]
+    zoom = _movement(fit, changes, alone, pixels)
+    alone = spread.copy()
+    alone[0], alone[:, 0] = 0.0, 0.0
+    return "zoom" if zoom > _movement(fit, changes, alone, pixels) else "centre"
+
+
+def _shears(fit: Linearised) -> Float[ndarray, "m n 2"]:
+    """What a shutter does that reads row after row while the target moves: u, or v, moves with the row."""
+    seen = fit.root > 0
+    n = fit.residual.shape[1] // 2
+    height = fit.camera.image_size[1]
+    row = np.where(seen[:, n:], fit.rows_px / height - 0.5, 0.0)
+    shears = np.zeros((*fit.residual.shape, 2))
+    shears[:, :n, 0], shears[:, n:, 1] = row, row
+    return shears
