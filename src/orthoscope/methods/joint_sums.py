@@ -24,7 +24,7 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.solve.losses import Linear, Loss
 
-__all__ = ["JointSums", "Measurements", "spline_unknowns"]
+__all__ = ["JointSums", "Measurements", "by_corner", "spline_unknowns", "spline_values"]
 
 SPACE = 3
 
@@ -93,11 +93,11 @@ class Measurements:
                 part, root = self._weigh(stacked, chunk, loss)
                 cost += part
                 _add_camera_and_poses(sums, stacked, chunk.rows, k)
-                turned = _by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows]) if self.corners_move else None
+                turned = by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows]) if self.corners_move else None
                 if turned is not None:
                     _add_corners(sums, stacked, turned, chunk.rows, k)
                 if isinstance(camera.lens, FreeLens):
-                    design = _design(camera.lens, poses.only(chunk.rows), points) * root[:, :, None]
+                    design = spline_values(camera.lens, poses.only(chunk.rows), points) * root[:, :, None]
                     frame = camera.lens_frame or camera.intrinsics
                     _add_spline(sums, design, stacked, chunk.rows, k, frame)
                     if turned is not None:
@@ -140,7 +140,7 @@ def _residuals(stacked: Float[ndarray, "v columns n2"]) -> Float[ndarray, "v n 2
     return stacked[:, -1].reshape(len(stacked), 2, -1).transpose(0, 2, 1)
 
 
-def _by_corner(by_translation: Float[ndarray, "v 3 n2"], rotation: Float[ndarray, "v 3 3"]) -> Float[ndarray, "v n 3 2"]:
+def by_corner(by_translation: Float[ndarray, "v 3 n2"], rotation: Float[ndarray, "v 3 3"]) -> Float[ndarray, "v n 3 2"]:
     """d(u, v) by the place of each corner in the target's frame."""
     views, _, rows = by_translation.shape
     turned = (rotation.transpose(0, 2, 1) @ by_translation).reshape(views, SPACE, 2, rows // 2)
@@ -156,15 +156,15 @@ def _add_camera_and_poses(sums: JointSums, stacked: ndarray, rows: slice, k: int
 
 def _add_corners(sums: JointSums, stacked: ndarray, turned: ndarray, rows: slice, k: int) -> None:
     views, columns, _ = stacked.shape
-    by_corner = stacked.reshape(views, columns, 2, -1).transpose(0, 3, 2, 1)  # (views, n, 2, columns)
-    products = turned @ by_corner
+    of_corner = stacked.reshape(views, columns, 2, -1).transpose(0, 3, 2, 1)  # (views, n, 2, columns)
+    products = turned @ of_corner
     sums.zc[:, :k] += products[..., :k].sum(0).transpose(0, 2, 1)
     sums.cc[:] += (turned @ turned.transpose(0, 1, 3, 2)).sum(0)
     sums.c[:] += products[..., -1].sum(0)
     sums.vc[rows] = products[..., k:-1].transpose(0, 1, 3, 2)
 
 
-def _design(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "v p g"]:
+def spline_values(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "v p g"]:
     """The value of every spline at every corner's place in the base's distorted plane."""
     in_camera = np.einsum("vab,pb->avp", poses.rotation, points) + poses.translation.T[:, :, None]
     return lens.over.lattice.design(*lens.base.warp(*lens.chart.flatten(*in_camera)))
