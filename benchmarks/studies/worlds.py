@@ -111,7 +111,7 @@ def true_error(world: World, pixels: ndarray, rays: ndarray) -> float:
 
 def _apart(camera: Projector, pixels: ndarray, rays: ndarray) -> float:
     """Rms distance of the pixels from where the true camera, turned as fits best, sees the rays."""
-    turn, step = np.eye(3), 1e-5
+    turn, step = np.diag([-1.0, -1.0, 1.0]) if camera.turned else np.eye(3), 1e-5
     off = np.full_like(pixels, np.nan)
     for _ in range(8):
         turned = rays @ turn.T

@@ -15,12 +15,13 @@ shape, which each view sees from another side, is taken for a camera that change
 
 How much the camera changes is the spread of the wishes without their noise: kappa_j ~ N(0, S), S by expectation
 maximisation, and the rms movement of the image that S makes, a rotation fitted out.  A shutter that reads row after row
-shears the image, which is no change of K, and is tested in the same way.
+shears the image, which is no change of K, and is tested in the same way.  The focal length alone and the principal point
+alone are tested too: one wish out of many stands out more by itself.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,17 +31,19 @@ from orthoscope.evaluation.f_distribution import f_survival
 from orthoscope.fitting.leave_one_out import hat_of
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.target import Detections
 from orthoscope.methods.reprojection import with_parameters
 from orthoscope.models.camera import Camera
 
-__all__ = ["Disagreement", "Wishes", "disagreement", "wishes"]
+__all__ = ["Disagreement", "Wishes", "changes_of", "disagreement", "spread_of", "wishes"]
 
 STEP = 0.01  # of the focal length or of the image's width: a change of K that counts as 1
 FAINT = 1e-3  # of the largest: an eigenvalue of T_j below it is no wish
 OWN = 0.3  # singular value of a pattern, C_j projected out: below it the pattern is one that K makes too
 LARGE, SURE = 3.0, 1e-4  # F2 above, p below: views do not agree
 FEWEST_VIEWS = 5
-SPREADING = 60  # rounds of expectation maximisation
+KINDS = {"zoom": [0], "centre": [1, 2], "shutter": [3, 4]}  # columns: scale, cx, cy, and the shears of a shutter
+SPREADING = 200  # rounds of expectation maximisation
 SAMPLE = 300  # pixels at which an image's movement is looked at
 
 
@@ -69,7 +72,7 @@ class Wishes(NamedTuple):
     @property
     def spread(self) -> Float[ndarray, "c c"]:
         """Covariance of the wishes without their noise."""
-        return _spread(self.kappa, self.told)
+        return spread_of(-(self.told @ self.kappa[..., None])[..., 0], self.told)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,31 +102,30 @@ class Disagreement:
 AGREED = Disagreement(float("nan"), float("nan"), False, "", 0.0, 0.0, 0.0, None)
 
 
-def disagreement(fit: Linearised, points: Float[ndarray, "p 3"], pixels: Float[ndarray, "n 2"]) -> Disagreement:
+def disagreement(fit: Linearised, detections: Detections) -> Disagreement:
     """Whether the views of a fit agree on one camera.
 
     Args:
-        fit: with every corner free and a free lens.
-        points: the target's corners, metres.
-        pixels: where corners were seen, in all views together.
+        fit: with every corner free and a free lens, of these detections.
     """
     names, changes = changes_of(fit)
+    points, pixels = detections.target.points, np.concatenate([view.pixels for view in detections.views])
     if fit.views < FEWEST_VIEWS or len(names) < 3:
         return AGREED
-    of_K = wishes(fit, points, fit.moves(changes))
-    of_shutter = wishes(fit, points, fit.without_pose(fit.root[..., None] * _shears(fit)))
-    if not (of_K.certain or of_shutter.certain):
-        return Disagreement(of_K.f2, of_K.p_value, False, "", 0.0, 0.0, 0.0, of_K)
+    moves = np.concatenate([fit.moves(changes), fit.without_pose(fit.root[..., None] * _shears(detections))], axis=2)
+    of_K = wishes(fit, points, moves[:, :, : len(names)])
+    tests = [of_K, *(wishes(fit, points, moves[:, :, columns]) for columns in KINDS.values())]
+    strongest = min(tests, key=lambda test: (not test.certain, test.p_value))
+    if not strongest.certain:
+        return replace(AGREED, f2=of_K.f2, p_value=of_K.p_value, wishes=of_K)
     spread = of_K.spread
-    by_px = _movement(fit, changes, spread, pixels)
-    kind = "shutter" if of_shutter.f2 > of_K.f2 else _kind(fit, changes, spread, pixels)
     width = fit.camera.image_size[0]
     return Disagreement(
-        f2=max(of_K.f2, of_shutter.f2),
-        p_value=min(of_K.p_value, of_shutter.p_value),
+        f2=strongest.f2,
+        p_value=strongest.p_value,
         certain=True,
-        kind=kind,
-        by_px=by_px,
+        kind=_kind(fit, moves),
+        by_px=_movement(fit, changes, spread, pixels),
         focal=STEP * float(np.sqrt(spread[0, 0])),
         centre_px=STEP * width * float(np.sqrt(spread[1, 1] + spread[2, 2])),
         wishes=of_K,
@@ -199,16 +201,17 @@ def _alike(fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray,
     return energy / (fit.noise * max(freedom, 1e-9)), freedom
 
 
-def _spread(kappa: Float[ndarray, "m c"], told: Float[ndarray, "m c c"]) -> Float[ndarray, "c c"]:
-    """Covariance S of kappa_j ~ N(0, S), each seen with covariance told_j^-1."""
-    heard = (told @ kappa[..., None])[..., 0]
-    spread = np.cov(kappa.T) + 1e-12 * np.eye(kappa.shape[1])
+def spread_of(score: Float[ndarray, "m c"], told: Float[ndarray, "m c c"]) -> Float[ndarray, "c c"]:
+    """Covariance S of changes kappa_j ~ N(0, S), of which view j tells exp(-kappa's_j - kappa'T_j kappa / 2)."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).mean(0), 1e-300))
+    heard, told = -score * scale, told * scale * scale[:, None]
+    spread = np.eye(len(scale))
     for _ in range(SPREADING):
         posterior = np.linalg.inv(np.linalg.inv(spread) + told)
         mean = (posterior @ heard[..., None])[..., 0]
         spread = (mean[:, :, None] * mean[:, None] + posterior).mean(0)
-        spread += 1e-12 * np.trace(spread) * np.eye(len(spread))
-    return spread
+        spread += 1e-9 * np.trace(spread) * np.eye(len(spread))
+    return spread * scale * scale[:, None]
 
 
 def _movement(fit: Linearised, changes: ndarray, spread: ndarray, pixels: Float[ndarray, "n 2"]) -> float:
@@ -227,22 +230,28 @@ def _moved_squared(camera: Camera, names: tuple[str, ...], step: ndarray, pixels
     return float(np.nanmean((difference**2).sum(1)))
 
 
-def _kind(fit: Linearised, changes: ndarray, spread: ndarray, pixels: ndarray) -> str:
-    """Which change moves the image more, the focal length or the principal point."""
-    alone = np.zeros_like(spread)
-    alone[0, 0] = spread[0, 0]
-    zoom = _movement(fit, changes, alone, pixels)
-    alone = spread.copy()
-    alone[0], alone[:, 0] = 0.0, 0.0
-    return "zoom" if zoom > _movement(fit, changes, alone, pixels) else "centre"
+def _kind(fit: Linearised, moves: Float[ndarray, "m n 5"]) -> str:
+    """Which of KINDS explains most, for each of its columns, of what the others leave."""
+    told = _told(moves, hat_of(fit, moves))
+    score = (moves * fit.errors[..., None]).sum(1)
+
+    def explained(columns: list[int]) -> float:
+        inverse, _ = _pseudo_inverse(told[:, columns][:, :, columns])
+        return float((score[:, columns] * (inverse @ score[:, columns, None])[..., 0]).sum())
+
+    everything = list(range(moves.shape[2]))
+    whole = explained(everything)
+    beyond = {
+        kind: (whole - explained([i for i in everything if i not in columns])) / len(columns) for kind, columns in KINDS.items()
+    }
+    return max(beyond, key=lambda kind: beyond[kind])
 
 
-def _shears(fit: Linearised) -> Float[ndarray, "m n 2"]:
+def _shears(detections: Detections) -> Float[ndarray, "m n 2"]:
     """What a shutter does that reads row after row while the target moves: u, or v, moves with the row."""
-    seen = fit.root > 0
-    n = fit.residual.shape[1] // 2
-    height = fit.camera.image_size[1]
-    row = np.where(seen[:, n:], fit.rows_px / height - 0.5, 0.0)
-    shears = np.zeros((*fit.residual.shape, 2))
-    shears[:, :n, 0], shears[:, n:, 1] = row, row
+    corners, height = len(detections.target.points), detections.image_size[1]
+    shears = np.zeros((len(detections.views), 2 * corners, 2))
+    for shear, view in zip(shears, detections.views, strict=True):
+        row = view.pixels[:, 1] / height - 0.5
+        shear[view.ids, 0], shear[corners + view.ids, 1] = row, row
     return shears
