@@ -23,7 +23,7 @@ import numpy as np
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["LeaveOneOut", "hat_of", "leave_one_out"]
+__all__ = ["LeaveOneOut", "hat_of", "leave_one_out", "scattered"]
 
 TOLERANCE = 1e-5  # of a view's residual: where conjugate gradients end
 ITERATIONS = 200
@@ -53,16 +53,8 @@ class LeaveOneOut:
 
     @property
     def scatter(self) -> Float[ndarray, "m d"]:
-        """Rows whose products sum to the jackknife's covariance of the camera: scatter' scatter."""
-        camera = self.changes[:, : self.of_camera]
-        known = camera[np.isfinite(camera).all(1)]
-        m = len(known)
-        return np.sqrt((m - 1) / m) * (known - known.mean(0)) if m else known
-
-    @property
-    def covariance(self) -> Float[ndarray, "d d"]:
-        """The jackknife's covariance of the camera's parameters and of its displacement's coefficients."""
-        return self.scatter.T @ self.scatter
+        """Rows whose products sum to the jackknife's covariance of the camera: scatter' scatter; NaN where a change is."""
+        return scattered(self.changes[:, : self.of_camera])
 
 
 def leave_one_out(fit: Linearised) -> LeaveOneOut:
@@ -74,6 +66,13 @@ def leave_one_out(fit: Linearised) -> LeaveOneOut:
         residuals = fit.without_pose(fit.residual + fit.changes(changes[..., None])[..., 0], weighted=False)
     residuals[~known], changes[~known] = np.nan, np.nan
     return LeaveOneOut(changes, residuals, fit.of_camera)
+
+
+def scattered(changes: Float[ndarray, "m d"]) -> Float[ndarray, "m d"]:
+    """Changes by leaving each view out, about their mean and scaled: their products sum to the jackknife's covariance."""
+    known = np.isfinite(changes).all(1)
+    m = max(int(known.sum()), 1)
+    return np.sqrt((m - 1) / m) * (changes - changes[known].sum(0) / m)
 
 
 def hat_of(fit: Linearised, rows: Float[ndarray, "m n c"]) -> Float[ndarray, "m n c"]:

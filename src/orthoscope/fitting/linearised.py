@@ -16,7 +16,7 @@ Rows of a view are the corners of the whole target, u first and then v, 0 where 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -108,6 +108,16 @@ class Linearised:
         """e_j: weighted residuals, the pose of each view fitted."""
         return self.without_pose(self.root * self.residual)
 
+    def only(self, rows: Int[ndarray, " v"]) -> Linearised:
+        """The same fit, which all its views made, with the rows of some of them."""
+        slopes = self.slopes
+        kept = replace(
+            slopes, camera=slopes.camera[rows], pose=slopes.pose[rows], spline=slopes.spline[rows], corner=slopes.corner[rows]
+        )
+        some = replace(self, slopes=kept, residual=self.residual[rows], root=self.root[rows])
+        some.__dict__.update(_covariance=self._covariance, _inverse_blocks=self._inverse_blocks)
+        return some
+
     def without_pose(self, rows: ndarray, *, weighted: bool = True) -> ndarray:
         """What is left of changes (m,2p) or (m,2p,c) of the weighted residuals when each view's pose has been fitted.
 
@@ -134,8 +144,13 @@ class Linearised:
             moved[:, : n // 2] += xx * along + xy * across
             moved[:, n // 2 :] += yx * along + yy * across
         if c and len(self.shape_precision):
-            moved += self._by_corners(self._displaced(x[..., k + 2 * g :, :]))
+            moved += self.changes_by_shape(self.slopes.corner, x)
         return moved
+
+    def changes_by_shape(self, corner: Float[ndarray, "m p 2 3"], x: ndarray) -> Float[ndarray, "m n c"]:
+        """The like of `changes` for the target's shape alone, with other slopes by the places of its corners."""
+        pairs = corner @ self._displaced(x[..., self.of_camera :, :])  # (m, p, 2, c)
+        return np.concatenate([pairs[:, :, 0], pairs[:, :, 1]], axis=1)
 
     def moves(self, x: ndarray) -> Float[ndarray, "m n c"]:
         """A_j x: how weighted residuals move, the pose of each view fitted; x as in `changes`."""
@@ -143,8 +158,11 @@ class Linearised:
 
     def pulls(self, rows: Float[ndarray, "m n c"]) -> Float[ndarray, "m q c"]:
         """A_j' times rows of each view."""
-        k, g, r, c = self.slopes.sizes
-        rows = self.root[..., None] * self.without_pose(rows)
+        return self.gathered(self.root[..., None] * self.without_pose(rows))
+
+    def gathered(self, rows: Float[ndarray, "m n c"]) -> Float[ndarray, "m q c"]:
+        """J_j' times rows of each view; `pulls` without weights, poses fixed."""
+        k, g, _, _ = self.slopes.sizes
         m, n, columns = rows.shape
         out = np.empty((m, self.unknowns, columns))
         out[:, :k] = self.slopes.camera @ rows
@@ -154,15 +172,26 @@ class Linearised:
             down = self.slopes.spline.transpose(0, 2, 1)
             out[:, k : k + g], out[:, k + g : k + 2 * g] = down @ (xx * u + yx * v), down @ (xy * u + yy * v)
         if len(self.shape_precision):
-            pairs = np.stack([rows[:, : n // 2], rows[:, n // 2 :]], axis=2)  # (m, p, 2, c)
-            of_corners = self.slopes.corner.transpose(0, 1, 3, 2) @ pairs  # (m, p, 3, c)
-            at = k + 2 * g
-            if r:
-                of_surface = np.tensordot(of_corners, self.slopes.surface, axes=(1, 0))  # (m, 3, c, r)
-                out[:, at : at + SPACE * r] = of_surface.transpose(0, 3, 1, 2).reshape(m, SPACE * r, columns)
-            if self.single:
-                out[:, at + SPACE * r :] = of_corners.reshape(m, SPACE * c, columns)
+            out[:, self.of_camera :] = self._gathered_by_shape(self.slopes.corner, rows)
         return out
+
+    def gathered_by_shape(self, corner: Float[ndarray, "m p 2 3"], rows: Float[ndarray, "m n c"]) -> Float[ndarray, "m q c"]:
+        """The like of `gathered` for the target's shape alone, with other slopes by the places of its corners."""
+        out = np.zeros((len(rows), self.unknowns, rows.shape[2]))
+        out[:, self.of_camera :] = self._gathered_by_shape(corner, rows)
+        return out
+
+    def _gathered_by_shape(self, corner: ndarray, rows: ndarray) -> Float[ndarray, "m s c"]:
+        (m, n, columns), (p, r) = rows.shape, self.slopes.surface.shape
+        pairs = np.stack([rows[:, : n // 2], rows[:, n // 2 :]], axis=2)  # (m, p, 2, c)
+        of_corners = corner.transpose(0, 1, 3, 2) @ pairs  # (m, p, 3, c)
+        found = []
+        if r:
+            of_surface = np.tensordot(of_corners, self.slopes.surface, axes=(1, 0))  # (m, 3, c, r)
+            found.append(of_surface.transpose(0, 3, 1, 2).reshape(m, SPACE * r, columns))
+        if self.single:
+            found.append(of_corners.reshape(m, SPACE * p, columns))
+        return np.concatenate(found, axis=1)
 
     def solved(self, pulls: ndarray) -> ndarray:
         """H^-1 times vectors (q,c) or (m,q,c)."""
@@ -209,7 +238,7 @@ class Linearised:
 
     def _displaced(self, x: ndarray) -> Float[ndarray, "*m p 3 c"]:
         """Displacements of the corners by coefficients (..., 3r + 3p, c)."""
-        r, c = self.slopes.surface.shape[1], self.slopes.corner.shape[1]
+        c, r = self.slopes.surface.shape
         columns, lead = x.shape[-1], x.shape[:-2]
         out = np.zeros((*lead, c, SPACE, columns))
         if r:
@@ -217,10 +246,6 @@ class Linearised:
         if self.single:
             out += x[..., SPACE * r :, :].reshape(out.shape)
         return out
-
-    def _by_corners(self, displaced: ndarray) -> Float[ndarray, "m n c"]:
-        pairs = self.slopes.corner @ displaced  # (m, p, 2, c)
-        return np.concatenate([pairs[:, :, 0], pairs[:, :, 1]], axis=1)
 
     @cached_property
     def _weighted_poses(self) -> Float[ndarray, "m n 6"]:
