@@ -49,13 +49,13 @@ class Agreement(NamedTuple):
     unknowns: ndarray
 
 
-def agreement(columns: Columns, whole: Whitening, tested: int) -> Agreement:
-    """Test one block of columns with the other blocks, and the poses, granted; NaN, and unknowns 0, where the views do not suffice.
+def agreement(columns: Columns, whole: Whitening, tested: tuple[int, ...]) -> Agreement:
+    """Test blocks of columns with the other blocks, and the poses, granted; NaN, and unknowns 0, where the views do not suffice.
 
-    whole: of all the columns' gram matrix.
+    whole: of all the columns' gram matrix.  tested: numbers of the blocks, side by side.
     """
-    granted = [i for i in range(len(columns.blocks)) if i != tested]
-    A, B = np.concatenate([columns.places[i] for i in granted]), columns.places[tested]
+    granted = [i for i in range(len(columns.blocks)) if i not in tested]
+    A, B = (np.concatenate([columns.places[i] for i in blocks]) for blocks in (granted, tested))
     white_A = whole.white_of(A)
     left = columns.without(granted, white_A.T @ (white_A @ (columns.score[A] / whole.lengths[A])) / whole.lengths[A])
     scores = columns.scores(left) / whole.lengths

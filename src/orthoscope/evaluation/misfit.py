@@ -18,7 +18,9 @@ For normal noise of one size it has Fisher's distribution, whatever the fit that
 take (G. Seber and A. Lee, Linear Regression Analysis, 2003, section 4.3); what a fit took beyond that, as an estimated target shape or a
 free lens does, only makes F smaller.  The target is tested with the image cells granted, A = (V, S, C), B = T, and the lens with the
 target granted, A = (V, S, T), B = C: a bent target makes a lens look bad and the other way round, so each is only blamed for what the
-other cannot explain.  Displacements have three components, since what a dent does in the image turns with the view; what poses do as well
+other cannot explain.  What a lens does besides its formula is smooth, and cells are steps: what they leave of a missing decentering would
+be blamed on the target.  So C also holds the smooth terms that any lens may have: radial ones up to the ninth power of the distance from the
+axis, decentering, thin prism, as displacements of the image.  Displacements have three components, since what a dent does in the image turns with the view; what poses do as well
 (shift, turn, size of the whole target) has rank 0 by itself.
 
 **The vote of the views.**  In real photographs the errors of one view hang together (blur, light, refinement), and then F exceeds 1
@@ -49,11 +51,14 @@ from orthoscope.evaluation.slopes import Slopes, parameters_of, slopes_of, stepp
 from orthoscope.evaluation.whitening import Whitening
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.methods.calibration import Calibration
+from orthoscope.models.camera import Camera
 
 __all__ = ["LensMisfit", "Misfit", "MisfitTest", "TargetMisfit", "misfit"]
 
 CELLS = 48  # of the image, about: finer than any lens varies, coarse enough for some corners in each
 PATCHES = 300  # of the target, about: each corner is one, but where there are more corners
+TARGET, LENS = 0, (2, 3)  # numbers of the blocks that are tested
+POWERS = (1, 2, 3, 4)  # of the squared distance, in the smooth terms along a radius
 CLIP = 5.0  # times the noise: one corner in 300 000 is beyond it by chance
 
 
@@ -102,13 +107,14 @@ def misfit(calibration: Calibration) -> Misfit:
     weight = _weights(slopes.residual)[:, None, None]
     camera = Block(weight * slopes.by_camera, np.zeros_like(slopes.view), 1)
     image = Block(weight * np.eye(2), cells.of(slopes.pixels), cells.columns * cells.rows)
+    smooth = Block(weight * _smooth_terms(calibration.camera, slopes.pixels + slopes.residual), np.zeros_like(slopes.view), 1)
     target = Block(weight * slopes.by_place, patches[slopes.corner], int(patches.max(initial=-1)) + 1)
-    columns = Columns(weight[:, 0] * slopes.residual, weight * slopes.by_pose, slopes.view, len(detections.views), (target, camera, image))
+    columns = Columns(weight[:, 0] * slopes.residual, weight * slopes.by_pose, slopes.view, len(detections.views), (target, camera, image, smooth))
     whole = Whitening.of(columns.gram)  # the target, which is large, stands first: what is granted to the lens is then a block of it
-    of_target, of_lens = agreement(columns, whole, 0), agreement(columns, whole, 2)
+    of_target, of_lens = agreement(columns, whole, (TARGET,)), agreement(columns, whole, LENS)
     return Misfit(
         TargetMisfit(of_target.test, _displacements(of_target, slopes, patches), _scale(slopes), _moved(calibration, columns, of_target)),
-        LensMisfit(of_lens.test, cells, _cell_residuals(of_lens, image, cells)),
+        LensMisfit(of_lens.test, cells, _cell_residuals(of_lens, image, smooth, cells)),
     )
 
 
@@ -139,7 +145,7 @@ def _moved(calibration: Calibration, columns: Columns, of_target: Agreement) -> 
     """How far the image moves (rms px at the detected corners) from this camera to the one that the displaced corners ask for."""
     if not of_target.unknowns.any():
         return 0.0
-    T, S, _ = columns.places
+    T, S, *_ = columns.places
     change = np.linalg.lstsq(columns.gram[np.ix_(S, S)], columns.gram[np.ix_(S, T)] @ of_target.unknowns, rcond=None)[0]
     camera = calibration.camera
     for name, step in zip(parameters_of(calibration), change, strict=True):
@@ -149,10 +155,28 @@ def _moved(calibration: Calibration, columns: Columns, of_target: Agreement) -> 
     return float(np.sqrt(np.nanmean(squared))) if np.isfinite(squared).any() else float("nan")
 
 
-def _cell_residuals(found: Agreement, image: Block, cells: Cells) -> Float[ndarray, "rows columns 2"]:
-    """Of each cell: the residual that all its corners share; NaN where there are none."""
+def _smooth_terms(camera: Camera, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2 w"]:
+    """What lenses do besides a formula, as displacements: radial terms, decentering, thin prism; distances over half the diagonal.
+
+    pixels: predicted.  (At detected ones, terms less the same terms of the formula would be the errors themselves.)
+    """
+    frame = camera.lens_frame or camera.intrinsics
+    x, y = ((pixels - [frame.cx, frame.cy]) / (0.5 * np.hypot(*camera.image_size))).T
+    s, zero = x * x + y * y, np.zeros_like(x)
+    radial = [(x * s**power, y * s**power) for power in POWERS]
+    decentering = [(s + 2.0 * x * x, 2.0 * x * y), (2.0 * x * y, s + 2.0 * y * y)]
+    prism = [(s, zero), (zero, s), (s * s, zero), (zero, s * s)]
+    return np.moveaxis(np.array([*radial, *decentering, *prism]), 0, -1).transpose(1, 0, 2)
+
+
+def _cell_residuals(found: Agreement, image: Block, smooth: Block, cells: Cells) -> Float[ndarray, "rows columns 2"]:
+    """Of each cell: the residual that all its corners share, smooth terms included; NaN where there are none."""
     seen = np.bincount(image.group, minlength=image.groups) > 0
-    return np.where(seen[:, None], found.unknowns.reshape(-1, 2), np.nan).reshape(cells.rows, cells.columns, 2)
+    steps, terms = np.split(found.unknowns, [image.width])
+    smoothly = smooth.times(terms)
+    counts = np.maximum(np.bincount(image.group, minlength=image.groups), 1)
+    means = np.stack([np.bincount(image.group, weights=row, minlength=image.groups) / counts for row in smoothly.T], axis=1)
+    return np.where(seen[:, None], steps.reshape(-1, 2) + means, np.nan).reshape(cells.rows, cells.columns, 2)
 
 
 def _scale(slopes: Slopes) -> float:
