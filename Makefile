@@ -1,14 +1,14 @@
 # make demo    the main job, with photographs that it renders itself
 # make test    the tests
 # make picture the picture in README.md, from the demo
-# make check   all that CI checks: format, lint, types, floors, tests
+# make check   all that CI checks: format, lint, types, rooms, tests
 # make bench   this project beside its peers; ONLY=solving runs that part (benchmarks/README.md)
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test quick check format lint types floors picture bench bench-peers clean
+.PHONY: demo test quick check format lint types rooms picture bench bench-peers clean
 
 demo: $(VENV)/installed
 	$(BIN)/orthoscope demo -o demo
@@ -19,7 +19,7 @@ test: $(VENV)/installed
 quick: $(VENV)/installed
 	$(BIN)/pytest -n auto -m "not slow"
 
-check: lint types floors test
+check: lint types rooms test
 
 lint: $(VENV)/installed
 	$(BIN)/ruff format --check
@@ -28,7 +28,7 @@ lint: $(VENV)/installed
 types: $(VENV)/installed
 	$(BIN)/pyright
 
-floors: $(VENV)/installed
+rooms: $(VENV)/installed
 	$(BIN)/lint-imports
 
 format: $(VENV)/installed

@@ -19,7 +19,9 @@ RESULTS, PAGE = HERE / "results.json", HERE / "RESULTS.md"
 
 
 def main(names: list[str]) -> int:
-    """Measure the parts of these names, all where there are none; figures of other parts stay as they were."""
+    """Measure the parts of these names, all where there are none; figures of other parts stay as they
+    were.
+    """
     if unknown := [name for name in names if name not in PARTS]:
         print(f"there is no part {unknown[0]!r}; expected some of {', '.join(PARTS)}.", file=sys.stderr)
         return 2
@@ -29,7 +31,9 @@ def main(names: list[str]) -> int:
             start = time.perf_counter()
             part = PARTS[name](peers, Path(folder))
             seconds = time.perf_counter() - start
-            results = read_results(RESULTS).with_part(name, part, machine=machine(), peers=peers, seconds=seconds)
+            results = read_results(RESULTS).with_part(
+                name, part, machine=machine(), peers=peers, seconds=seconds
+            )
             write_results(RESULTS, results)
             PAGE.write_text(page(results), encoding="utf-8")
             print(f"{seconds:.0f} s", file=sys.stderr)

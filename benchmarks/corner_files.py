@@ -7,14 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from orthoscope.geometry.pose import Pose
-from orthoscope.geometry.target import Detections
 from orthoscope.models.camera import Camera
+from orthoscope.targets.detections import Detections
 
 __all__ = ["write_corners"]
 
 
-def write_corners(path: Path, detections: Detections, camera: Camera, camera_from_target: tuple[Pose, ...]) -> str:
-    """Write detections with a camera and poses near the truth, which give first guesses and start held-out poses; returns the path."""
+def write_corners(
+    path: Path, detections: Detections, camera: Camera, camera_from_target: tuple[Pose, ...]
+) -> str:
+    """Write detections with a camera and poses near the truth, which give first guesses and start held-out
+    poses; returns the path.
+    """
     views = detections.views
     np.savez(
         path,
@@ -33,7 +37,9 @@ def write_corners(path: Path, detections: Detections, camera: Camera, camera_fro
 
 
 def _field_of_view(camera: Camera) -> float:
-    """Twice the angle from the axis to the farther of the left and right borders, radians; 190 degrees where a border sees nothing."""
+    """Twice the angle from the axis to the farther of the left and right borders, radians; 190 degrees where
+    a border sees nothing.
+    """
     width, height = camera.image_size
     rays = camera.unproject(np.array([[0.0, height / 2], [width - 1.0, height / 2]]))
     return float(2.0 * np.arccos(rays[:, 2].min())) if np.isfinite(rays).all() else float(np.deg2rad(190.0))

@@ -11,7 +11,10 @@ __all__ = ["machine"]
 
 def machine() -> str:
     """Processor, cores, system and Python in one line."""
-    return f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, Python {platform.python_version()}"
+    return (
+        f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, Python"
+        f" {platform.python_version()}"
+    )
 
 
 def _processor() -> str:

@@ -22,7 +22,9 @@ WORDS = {True: "yes", False: "**no**", None: ""}
 
 @dataclass(frozen=True)
 class Measured:
-    """A part, and where it was measured: machine, versions of the peers that were asked, reasons why others could not be, duration."""
+    """A part, and where it was measured: machine, versions of the peers that were asked, reasons why others
+    could not be, duration.
+    """
 
     part: Part
     machine: str
@@ -60,7 +62,9 @@ def read_results(path: Path) -> Results:
 def page(results: Results) -> str:
     """The results as Markdown."""
     parts = results.parts.values()
-    return "\n".join([HEAD, *_where(results), "", *_budgets(results), *(line for one in parts for line in _of_part(one))])
+    return "\n".join(
+        [HEAD, *_where(results), "", *_budgets(results), *(line for one in parts for line in _of_part(one))]
+    )
 
 
 def _measured(entry: dict[str, Any]) -> Measured:
@@ -80,7 +84,12 @@ def _where(results: Results) -> list[str]:
 
 def _budgets(results: Results) -> list[str]:
     """Every row that has a budget, those that miss it first."""
-    judged = [(one.part.title, row) for one in results.parts.values() for row in one.part.rows if row.at_most is not None]
+    judged = [
+        (one.part.title, row)
+        for one in results.parts.values()
+        for row in one.part.rows
+        if row.at_most is not None
+    ]
     met = sum(bool(row.met) for _, row in judged)
     lines = [
         f"## Budgets: {met} of {len(judged)} met",
@@ -89,20 +98,31 @@ def _budgets(results: Results) -> list[str]:
         "|---|---|---|---:|---:|---|",
     ]
     return lines + [
-        f"| {title} | {row.quantity} | {row.peer} | {_number(row.judged)}{_own_unit(row)} | {_number(row.at_most)} | {WORDS[row.met]} |"
+        f"| {title} | {row.quantity} | {row.peer} | {_number(row.judged)}{_own_unit(row)} |"
+        f" {_number(row.at_most)} | {WORDS[row.met]} |"
         for title, row in sorted(judged, key=lambda pair: bool(pair[1].met))
     ]
 
 
 def _of_part(one: Measured) -> list[str]:
     lines = ["", f"## {one.part.title}", "", one.part.about, ""]
-    lines += ["| quantity | ratio | at most | met | orthoscope | peer | | against | remarks |", "|---|---:|---:|---|---:|---:|---|---|---|"]
+    lines += [
+        "| quantity | ratio | at most | met | orthoscope | peer | | against | remarks |",
+        "|---|---:|---:|---|---:|---:|---|---|---|",
+    ]
     lines += [
         f"| {row.quantity} | {_number(row.ratio)} | {_number(row.at_most)} | {WORDS[row.met]} "
         f"| {_number(row.ours)} | {_number(row.theirs)} | {row.unit} | {row.peer} | {row.note} |"
         for row in one.part.rows
     ]
-    return [*lines, "", *one.part.appendix, "", *(f"- {remark}" for remark in one.part.remarks), f"- Measured in {one.seconds:.0f} s."]
+    return [
+        *lines,
+        "",
+        *one.part.appendix,
+        "",
+        *(f"- {remark}" for remark in one.part.remarks),
+        f"- Measured in {one.seconds:.0f} s.",
+    ]
 
 
 def _own_unit(row: Row) -> str:

@@ -1,6 +1,7 @@
 """The peers: where each lives, a process that does what it is asked, and a plain reason where there is none.
 
-A worker (workers/) reads requests from its stdin and answers on its stdout, so a peer needs only a Python that can import it.
+A worker (workers/) reads requests from its stdin and answers on its stdout, so a peer needs only a Python
+that can import it.
 """
 
 from __future__ import annotations
@@ -88,7 +89,13 @@ class Peers:
         if line is None:
             process.kill()
         self.stop(name)
-        return {"failed": f"no answer within {PATIENCE:.0f} s" if line is None else f"its process ended with code {process.returncode}"}
+        return {
+            "failed": (
+                f"no answer within {PATIENCE:.0f} s"
+                if line is None
+                else f"its process ended with code {process.returncode}"
+            )
+        }
 
 
 def _answer(process: subprocess.Popen[str], request: str) -> str | None:

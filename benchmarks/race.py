@@ -1,4 +1,6 @@
-"""Times of several contenders that take turns, so that what else the machine does falls on all of them alike."""
+"""Times of several contenders that take turns, so that what else the machine does falls on all of
+them alike.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ PATIENCE = 60.0  # seconds: a contender that has taken so long in all is not ask
 
 
 class Result(NamedTuple):
-    """A contender's last answer, and the least CPU and wall time of its turns, milliseconds; failed: why there is none."""
+    """A contender's last answer, and the least CPU and wall time of its turns, milliseconds; failed: why
+    there is none.
+    """
 
     answer: dict[str, Any]
     cpu: float
@@ -25,7 +29,9 @@ class Result(NamedTuple):
 
 
 def race(contenders: Mapping[str, Callable[[], dict[str, Any]]], *, rounds: int) -> dict[str, Result]:
-    """Each contender's best of so many rounds; a contender returns {"cpu", "wall", ...} in seconds or {"failed"}."""
+    """Each contender's best of so many rounds; a contender returns {"cpu", "wall", ...} in seconds or
+    {"failed"}.
+    """
     results: dict[str, Result] = {}
     spent = dict.fromkeys(contenders, 0.0)
     for _ in range(rounds):
@@ -39,7 +45,9 @@ def race(contenders: Mapping[str, Callable[[], dict[str, Any]]], *, rounds: int)
                 continue
             spent[name] += answer["wall"]
             cpu, wall = 1e3 * answer["cpu"], 1e3 * answer["wall"]
-            results[name] = Result(answer, min(cpu, best.cpu) if best else cpu, min(wall, best.wall) if best else wall)
+            results[name] = Result(
+                answer, min(cpu, best.cpu) if best else cpu, min(wall, best.wall) if best else wall
+            )
     return results
 
 
@@ -47,7 +55,9 @@ def whole_process(command: list[str | Path], *, cwd: Path | None = None) -> dict
     """Run a command to its end as a user would: {"cpu", "wall", "out"} in seconds, or {"failed"}."""
     before, start = os.times(), time.perf_counter()
     try:
-        done = subprocess.run([str(part) for part in command], capture_output=True, text=True, cwd=cwd, check=False)
+        done = subprocess.run(
+            [str(part) for part in command], capture_output=True, text=True, cwd=cwd, check=False
+        )
     except OSError as error:
         return {"failed": f"{command[0]} cannot be run: {error.strerror}"}
     wall, after = time.perf_counter() - start, os.times()

@@ -9,13 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
-from orthoscope.geometry.target import Detections, Target, View, chessboard
+from orthoscope.targets.detections import Detections, Target, View, chessboard
 
 __all__ = ["SETS", "RealSet", "babel_cube", "classic_corners", "datasets", "zhang"]
 
 
 class RealSet(NamedTuple):
-    """Where the corners and the photographs of a chessboard are, how many inner corners it has, and the lens that suits the camera."""
+    """Where the corners and the photographs of a chessboard are, how many inner corners it has, and the lens
+    that suits the camera.
+    """
 
     corners: str
     photographs: str
@@ -50,7 +52,9 @@ def classic_corners(folder: Path, name: str) -> Detections:
     pixels = table["image_points_classic"].astype(float)
     found = np.isfinite(pixels).all((1, 2))
     ids = np.arange(len(points))
-    views = [View(str(file), ids, seen) for file, seen in zip(table["files"][found], pixels[found], strict=True)]
+    views = [
+        View(str(file), ids, seen) for file, seen in zip(table["files"][found], pixels[found], strict=True)
+    ]
     return Detections(target, _image_size(table), tuple(views))
 
 
@@ -61,8 +65,12 @@ def zhang(folder: Path) -> Detections:
 
 
 def babel_cube(folder: Path) -> tuple[Detections, int]:
-    """The views of babel-cube, first those to learn from, then the published test views; and how many are to learn from."""
-    (train, test), points, size = _ragged(folder, ["babel-cube/corners-train.npz", "babel-cube/corners-test.npz"])
+    """The views of babel-cube, first those to learn from, then the published test views; and how many are to
+    learn from.
+    """
+    (train, test), points, size = _ragged(
+        folder, ["babel-cube/corners-train.npz", "babel-cube/corners-test.npz"]
+    )
     grid = (len(np.unique(points[:, 0])), len(np.unique(points[:, 1])))
     return Detections(Target("babel-cube", points, grid=grid), size, (*train, *test)), len(train)
 
@@ -70,7 +78,9 @@ def babel_cube(folder: Path) -> tuple[Detections, int]:
 def _ragged(folder: Path, names: list[str]) -> tuple[list[tuple[View, ...]], ndarray, tuple[int, int]]:
     """Views of each table over one target: all points that any view has."""
     tables = [np.load(folder / name) for name in names]
-    points, ids = np.unique(np.concatenate([table["object_points"] for table in tables]), axis=0, return_inverse=True)
+    points, ids = np.unique(
+        np.concatenate([table["object_points"] for table in tables]), axis=0, return_inverse=True
+    )
     parts = np.split(ids.ravel(), np.cumsum([len(table["view"]) for table in tables])[:-1])
     splits = [_views(table, part, name) for table, part, name in zip(tables, parts, names, strict=True)]
     return splits, points, _image_size(tables[0])
@@ -78,7 +88,10 @@ def _ragged(folder: Path, names: list[str]) -> tuple[list[tuple[View, ...]], nda
 
 def _views(table, ids: ndarray, name: str) -> tuple[View, ...]:
     rows = [table["view"] == view for view in range(len(table["files"]))]
-    return tuple(View(f"{Path(name).stem} {i:02d}", ids[seen], table["image_points"][seen]) for i, seen in enumerate(rows))
+    return tuple(
+        View(f"{Path(name).stem} {i:02d}", ids[seen], table["image_points"][seen])
+        for i, seen in enumerate(rows)
+    )
 
 
 def _image_size(table) -> tuple[int, int]:

@@ -8,13 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from orthoscope.evaluation.render import Renderer
-from orthoscope.evaluation.simulate import Scene, random_views
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.geometry.target import chessboard
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import Brown
+from orthoscope.simulation.render import Renderer
+from orthoscope.simulation.scene import Scene, random_views
+from orthoscope.targets.detections import chessboard
 
 __all__ = ["Condition", "Photographs", "rendered"]
 
@@ -23,7 +23,9 @@ USUAL_LENS = Brown(k1=-0.2, k2=0.05)
 
 @dataclass(frozen=True)
 class Condition:
-    """What is photographed and how: size (width, height), least and greatest tilt (degrees), blur (px), noise (grey levels at mid-grey)."""
+    """What is photographed and how: size (width, height), least and greatest tilt (degrees), blur (px), noise
+    (grey levels at mid-grey).
+    """
 
     name: str
     size: tuple[int, int] = (1280, 960)
@@ -51,8 +53,12 @@ class Photographs:
     grid: tuple[int, int]
 
     def errors(self, found: list[list[list[float]]]) -> list[Float[ndarray, " m"] | None]:
-        """Distance of each corner found from the truth, px, in any order; None for a photograph without a whole board."""
-        return [_distances(truth, np.array(corners)) for truth, corners in zip(self.corners, found, strict=True)]
+        """Distance of each corner found from the truth, px, in any order; None for a photograph without a
+        whole board.
+        """
+        return [
+            _distances(truth, np.array(corners)) for truth, corners in zip(self.corners, found, strict=True)
+        ]
 
 
 def rendered(condition: Condition, folder: Path) -> Photographs:

@@ -1,4 +1,6 @@
-"""What a benchmark finds: rows with a figure of ours and a figure of a peer, in parts that share a question."""
+"""What a benchmark finds: rows with a figure of ours and a figure of a peer, in parts that share a
+question.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,8 @@ __all__ = ["Part", "Row"]
 class Row:
     """One quantity: our figure, the peer's, what they are of.
 
-    theirs: None where the quantity stands for itself.  at_most: budget of the ratio ours / theirs, or of `ours` where it stands for itself.
-    note: what a reader must know beside the figures.
+    theirs: None where the quantity stands for itself. at_most: budget of the ratio ours / theirs, or of
+    `ours` where it stands for itself. note: what a reader must know beside the figures.
     """
 
     quantity: str

@@ -1,4 +1,6 @@
-"""What every test stands on: shapes in annotations are checked, hypothesis repeats itself, real photographs where they are present."""
+"""What every test stands on: shapes in annotations are checked, hypothesis repeats itself, real photographs
+where they are present.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ import pytest
 from hypothesis import settings
 from jaxtyping import install_import_hook
 
-install_import_hook("orthoscope", "shapes.checked")  # before anything imports orthoscope
+install_import_hook("orthoscope", "helpers.shapes.checked")  # before anything imports orthoscope
 
 settings.register_profile("orthoscope", deadline=None, derandomize=True, max_examples=30)
 settings.load_profile("orthoscope")

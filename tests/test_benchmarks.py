@@ -52,8 +52,12 @@ def test_the_page_is_written_from_the_file_of_results(tmp_path: Path):
 
 
 def test_a_part_that_is_measured_again_replaces_itself_and_leaves_the_others():
-    before = results_of(Row("old", 1.0)).with_part("points", Part("Points", ""), machine="", peers=Peers({}), seconds=0.0)
-    after = before.with_part("solving", Part("Solving", "", [Row("new", 1.0)]), machine="", peers=Peers({}), seconds=0.0)
+    before = results_of(Row("old", 1.0)).with_part(
+        "points", Part("Points", ""), machine="", peers=Peers({}), seconds=0.0
+    )
+    after = before.with_part(
+        "solving", Part("Solving", "", [Row("new", 1.0)]), machine="", peers=Peers({}), seconds=0.0
+    )
     assert list(after.parts) == ["solving", "points"]
     assert [row.quantity for row in after.parts["solving"].part.rows] == ["new"]
 
@@ -86,7 +90,9 @@ def test_a_refitted_pose_is_the_one_of_least_squares():
     pixels = CAMERA.project(POSE.apply(points))
     start = rotation_of(np.array([0.05, 0.03, -0.04])) @ POSE.rotation, POSE.translation + 0.02
     error = refit_pose(CAMERA.project, points, pixels, start)
-    assert np.abs(error).max() < 1e-6  # differences of 1e-6 are good to 1e-9 of the slopes, which only slows the last steps
+    assert (
+        np.abs(error).max() < 1e-6
+    )  # differences of 1e-6 are good to 1e-9 of the slopes, which only slows the last steps
 
 
 @pytest.mark.slow
@@ -94,8 +100,12 @@ def test_this_project_answers_as_a_worker_does(tmp_path: Path):
     target = chessboard(6, 4, 0.03)
     tilts = [np.array([a, b, 0.1]) for a in (-0.5, 0.1, 0.5) for b in (-0.4, 0.3)]
     poses = tuple(Pose(rotation_of(tilt), np.array([-0.07, -0.05, 0.5])) for tilt in tilts)
-    views = tuple(View(f"{i}", np.arange(24), CAMERA.project(pose.apply(target.points))) for i, pose in enumerate(poses))
-    path = write_corners(tmp_path / "corners.npz", Detections(target, CAMERA.image_size, views), CAMERA, poses)
+    views = tuple(
+        View(f"{i}", np.arange(24), CAMERA.project(pose.apply(target.points))) for i, pose in enumerate(poses)
+    )
+    path = write_corners(
+        tmp_path / "corners.npz", Detections(target, CAMERA.image_size, views), CAMERA, poses
+    )
     with Peers() as peers:
         solved = peers.ask("orthoscope", "solve", path=path, kind="brown")
         unseen = peers.ask("orthoscope", "held_out", path=path, kind="brown", folds=[[0, 1], [2]])

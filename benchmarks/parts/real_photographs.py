@@ -1,4 +1,6 @@
-"""Corners in real photographs: whose corners make the same calibration fit better, and who finds more boards."""
+"""Corners in real photographs: whose corners make the same calibration fit better, and who finds
+more boards.
+"""
 
 from __future__ import annotations
 
@@ -12,19 +14,20 @@ from benchmarks.corner_files import write_corners
 from benchmarks.peers import Peers
 from benchmarks.real_sets import SETS, RealSet, datasets
 from benchmarks.rows import Part, Row
+from orthoscope.files.images import photographs, read_image
 from orthoscope.geometry.arrays import CalibrationError, ndarray
-from orthoscope.geometry.target import Detections, View, chessboard
-from orthoscope.io.images import photographs, read_image
 from orthoscope.methods.fccm import fccm
+from orthoscope.targets.detections import Detections, View, chessboard
 
 __all__ = ["real_photographs"]
 
 FINDERS = {"classic 5": "OpenCV", "classic 11": "OpenCV", "sb": "OpenCV", "orthoscope": "orthoscope"}
 ABOUT = (
-    "Root mean square residual of the same calibration, px per point, over the photographs in which all found the board: a flat board "
-    "with the lens that suits the camera, and where it is there a board whose corners are free, so that the board's own faults do not "
-    "hide the corners'. OpenCV's figure is the best of findChessboardCorners with cornerSubPix (windows 5 and 11) and "
-    "findChessboardCornersSB with ACCURACY."
+    "Root mean square residual of the same calibration, px per point, over the photographs in which all found"
+    " the board: a flat board with the lens that suits the camera, and where it is there a board whose"
+    " corners are free, so that the board's own faults do not hide the corners'. OpenCV's figure is the best"
+    " of findChessboardCorners with cornerSubPix (windows 5 and 11) and findChessboardCornersSB with"
+    " ACCURACY."
 )
 
 Found = dict[str, dict[str, ndarray]]  # by finder, by photograph
@@ -47,17 +50,28 @@ def real_photographs(peers: Peers, folder: Path) -> Part:
         most = max(len(found[kind]) for kind in FINDERS if kind != "orthoscope")
         missed = float(most - len(found["orthoscope"]))
         note = f"{len(found['orthoscope'])} and {most} of {len(paths)} found"
-        part.rows.append(Row(f"{name}: boards found fewer than the best finder", missed, unit="", at_most=0.0, note=note))
+        part.rows.append(
+            Row(f"{name}: boards found fewer than the best finder", missed, unit="", at_most=0.0, note=note)
+        )
         for kind in (real.lens, "free target") if real.lens == "brown" else (real.lens,):
             _compare(part, peers, folder, (name, kind), found, logs)
     for kind, values in logs.items():
-        part.rows.append(Row(f"geometric mean of {len(values)} ratios: {kind}", math.exp(float(np.mean(values))), unit="", at_most=0.95))
+        part.rows.append(
+            Row(
+                f"geometric mean of {len(values)} ratios: {kind}",
+                math.exp(float(np.mean(values))),
+                unit="",
+                at_most=0.95,
+            )
+        )
     return part
 
 
 def _photographs(data: Path, real: RealSet) -> list[str]:
     """The files of a set that have the size of most."""
-    files = [file for file in photographs([data / real.photographs.split("/")[0]]) if file.match(real.photographs)]
+    files = [
+        file for file in photographs([data / real.photographs.split("/")[0]]) if file.match(real.photographs)
+    ]
     sizes = [read_image(file, grey=True).shape for file in files]
     usual = max(set(sizes), key=sizes.count)
     return [str(file) for file, size in zip(files, sizes, strict=True) if size == usual]
@@ -67,13 +81,19 @@ def _found(part: Part, answer: dict[str, Any], paths: list[str], kind: str) -> d
     if "failed" in answer:
         part.remarks.append(f"{kind}: {answer['failed']}.")
         return {}
-    return {path: np.array(corners) for path, corners in zip(paths, answer["corners"], strict=True) if corners}
+    return {
+        path: np.array(corners) for path, corners in zip(paths, answer["corners"], strict=True) if corners
+    }
 
 
-def _compare(part: Part, peers: Peers, folder: Path, what: tuple[str, str], found: Found, logs: dict[str, list[float]]) -> None:
+def _compare(
+    part: Part, peers: Peers, folder: Path, what: tuple[str, str], found: Found, logs: dict[str, list[float]]
+) -> None:
     """The row of one calibration on one set."""
     (name, kind), ours = what, found["orthoscope"]
-    common = [path for path in ours if all(_same_board(ours[path], each.get(path)) for each in found.values())]
+    common = [
+        path for path in ours if all(_same_board(ours[path], each.get(path)) for each in found.values())
+    ]
     if not common:
         part.remarks.append(f"{name}: no board was found by all.")
         return
@@ -86,8 +106,18 @@ def _compare(part: Part, peers: Peers, folder: Path, what: tuple[str, str], foun
             return
         rms[finder] = answer["rms"]
     best = min((finder for finder in rms if finder != "orthoscope"), key=lambda finder: rms[finder])
-    told = ", ".join(f"{finder} {value:.4f}" for finder, value in rms.items() if finder not in ("orthoscope", best))
-    row = Row(f"{name}: {kind}, {len(common)} photographs", rms["orthoscope"], f"OpenCV {best}", rms[best], "px", 0.95, told)
+    told = ", ".join(
+        f"{finder} {value:.4f}" for finder, value in rms.items() if finder not in ("orthoscope", best)
+    )
+    row = Row(
+        f"{name}: {kind}, {len(common)} photographs",
+        rms["orthoscope"],
+        f"OpenCV {best}",
+        rms[best],
+        "px",
+        0.95,
+        told,
+    )
     logs.setdefault(kind, []).append(math.log(rms["orthoscope"] / rms[best]))
     part.rows.append(row)
 
@@ -102,7 +132,12 @@ def _fit(peers: Peers, path: Path, real: RealSet, corners: dict[str, ndarray], k
         near = fccm(detections, lens=real.lens)
     except CalibrationError as error:
         return {"failed": str(error)}
-    return peers.ask("orthoscope", "solve", path=write_corners(path, detections, near.camera, near.camera_from_target), kind=kind)
+    return peers.ask(
+        "orthoscope",
+        "solve",
+        path=write_corners(path, detections, near.camera, near.camera_from_target),
+        kind=kind,
+    )
 
 
 def _order(ours: ndarray, theirs: ndarray) -> ndarray:
@@ -111,4 +146,8 @@ def _order(ours: ndarray, theirs: ndarray) -> ndarray:
 
 
 def _same_board(ours: ndarray, theirs: ndarray | None) -> bool:
-    return theirs is not None and theirs.shape == ours.shape and len(np.unique(_order(ours, theirs))) == len(ours)
+    return (
+        theirs is not None
+        and theirs.shape == ours.shape
+        and len(np.unique(_order(ours, theirs))) == len(ours)
+    )

@@ -13,10 +13,10 @@ from benchmarks.corner_files import write_corners
 from benchmarks.peers import Peers
 from benchmarks.race import Result, race
 from benchmarks.rows import Part, Row
-from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
-from orthoscope.geometry.target import Detections, View, chessboard
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.simulation.scene import Scene, random_views, simulate_detections
+from orthoscope.targets.detections import Detections, View, chessboard
 
 __all__ = ["COUNTS", "ROUNDS", "scene_file", "solving"]
 
@@ -24,12 +24,19 @@ COUNTS = (15, 50, 200, 1000)
 ROUNDS = {15: 15, 50: 9, 200: 5, 1000: 3}
 NOISE = 0.1  # px
 SAME = 1.0 + 1e-9  # of two costs
-USUAL = Camera((640, 480), Intrinsics(750.0, 751.0, 321.0, 243.0), Brown(k1=-0.25, k2=0.08, p1=0.0008, p2=-0.0006, k3=0.02))
-WIDE = Camera((1280, 960), Intrinsics(620.0, 621.0, 642.0, 477.0), KannalaBrandt(k1=-0.02, k2=0.003, k3=-0.001))
+USUAL = Camera(
+    (640, 480),
+    Intrinsics(750.0, 751.0, 321.0, 243.0),
+    Brown(k1=-0.25, k2=0.08, p1=0.0008, p2=-0.0006, k3=0.02),
+)
+WIDE = Camera(
+    (1280, 960), Intrinsics(620.0, 621.0, 642.0, 477.0), KannalaBrandt(k1=-0.02, k2=0.003, k3=-0.001)
+)
 ABOUT = (
-    "Simulated views of 14x20 corners, noise 0.1 px, every corner in every view. Process CPU time of one call, initialisation included,"
-    " one thread, the best of several rounds in which all take turns. OpenCV has 100 iterations and 1e-10; mrcal and lensboy estimate "
-    "no warp and reject no outliers here. Square and pixels are chosen so that OpenCV's single precision holds them exactly."
+    "Simulated views of 14x20 corners, noise 0.1 px, every corner in every view. Process CPU time of one"
+    " call, initialisation included, one thread, the best of several rounds in which all take turns. OpenCV"
+    " has 100 iterations and 1e-10; mrcal and lensboy estimate no warp and reject no outliers here. Square"
+    " and pixels are chosen so that OpenCV's single precision holds them exactly."
 )
 
 
@@ -38,7 +45,9 @@ def solving(peers: Peers, folder: Path) -> Part:
     part = Part("Solving", ABOUT)
     files = {count: scene_file(folder, count) for count in COUNTS}
     for lens, flat, budget in (("brown", "flat 5", 0.25), ("rational", "flat 8", 0.5)):
-        times = {count: _against_opencv(part, peers, files[count], count, (lens, flat, budget)) for count in COUNTS}
+        times = {
+            count: _against_opencv(part, peers, files[count], count, (lens, flat, budget)) for count in COUNTS
+        }
         _growth(part, lens, times)
     for count in COUNTS[:3]:
         for peer, kind, budget in (("mrcal", "OPENCV5 plain", 0.20), ("lensboy", "5 plain", 0.05)):
@@ -79,7 +88,9 @@ def _against_opencv(part: Part, peers: Peers, path: str, count: int, what: tuple
     return ours
 
 
-def _row(part: Part, peers: Peers, path: str, count: int, what: tuple[str, str, str, float | None]) -> tuple[Result, Result]:
+def _row(
+    part: Part, peers: Peers, path: str, count: int, what: tuple[str, str, str, float | None]
+) -> tuple[Result, Result]:
     """One race of ours against a peer; its row, or why there is none."""
     lens, peer, kind, budget = what
     contenders = {"ours": solver(peers, "orthoscope", path, lens), "theirs": solver(peers, peer, path, kind)}
@@ -89,7 +100,9 @@ def _row(part: Part, peers: Peers, path: str, count: int, what: tuple[str, str, 
     if ours.failed or theirs.failed:
         part.remarks.append(f"{quantity}, against {name}: {ours.failed or theirs.failed}.")
     else:
-        note = f"wall {ours.wall / theirs.wall:.2f}; rms {ours.answer['rms']:.5f} and {theirs.answer['rms']:.5f}"
+        note = (
+            f"wall {ours.wall / theirs.wall:.2f}; rms {ours.answer['rms']:.5f} and {theirs.answer['rms']:.5f}"
+        )
         part.rows.append(Row(quantity, ours.cpu, name, theirs.cpu, "ms", budget, note))
     return ours, theirs
 
@@ -99,24 +112,34 @@ def _growth(part: Part, lens: str, times: dict[int, Result]) -> None:
     first, last = min(times), max(times)
     if not (times[first].failed or times[last].failed):
         exponent = math.log(times[last].cpu / times[first].cpu) / math.log(last / first)
-        part.rows.append(Row(f"{lens}: growth exponent, {first} to {last} views", exponent, unit="", at_most=1.05))
+        part.rows.append(
+            Row(f"{lens}: growth exponent, {first} to {last} views", exponent, unit="", at_most=1.05)
+        )
 
 
 def _memory(part: Part, peers: Peers, path: str) -> None:
-    """The most memory that a fresh process held for the largest problem, everything that it had to import included."""
+    """The most memory that a fresh process held for the largest problem, everything that it had to import
+    included.
+    """
     held: dict[str, float] = {}
     for peer, kind in (("orthoscope", "brown"), ("OpenCV", "flat 5")):
         peers.stop(peer)
         peers.ask(peer, "solve", path=path, kind=kind)
         held[peer] = peers.ask(peer, "peak").get("megabytes", math.nan)
-    part.rows.append(Row("peak memory, 1000 views", held["orthoscope"], "OpenCV flat 5", held["OpenCV"], "MB", 1.0))
+    part.rows.append(
+        Row("peak memory, 1000 views", held["orthoscope"], "OpenCV flat 5", held["OpenCV"], "MB", 1.0)
+    )
 
 
 def _covariance(part: Part, peers: Peers, files: dict[int, str]) -> None:
     for count, path in files.items():
-        answers = [peers.ask("orthoscope", "covariance", path=path, kind="brown") for _ in range(ROUNDS[count])]
+        answers = [
+            peers.ask("orthoscope", "covariance", path=path, kind="brown") for _ in range(ROUNDS[count])
+        ]
         if failed := next((answer["failed"] for answer in answers if "failed" in answer), None):
             part.remarks.append(f"covariance: {failed}.")
             return
         share = min(answer["covariance"] for answer in answers) / min(answer["cpu"] for answer in answers)
-        part.rows.append(Row(f"covariance, {count} views: share of the whole", 100.0 * share, unit="%", at_most=5.0))
+        part.rows.append(
+            Row(f"covariance, {count} views: share of the whole", 100.0 * share, unit="%", at_most=5.0)
+        )

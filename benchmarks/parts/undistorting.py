@@ -1,4 +1,6 @@
-"""Straight pictures: a folder of photographs, a video, one photograph; whole processes, as a user runs them."""
+"""Straight pictures: a folder of photographs, a video, one photograph; whole processes, as a user
+runs them.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,15 @@ import numpy as np
 from benchmarks.peers import HERE, PEERS, Peers
 from benchmarks.race import ORTHOSCOPE, race, whole_process
 from benchmarks.rows import Part, Row
-from orthoscope.evaluation.render import photographs
-from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
-from orthoscope.geometry.target import chessboard
-from orthoscope.io.images import read_image
-from orthoscope.io.own_json import save
-from orthoscope.methods.calibration import Calibration
+from orthoscope.files.images import read_image
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.formats.own.json import save
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
+from orthoscope.simulation.render import photographs
+from orthoscope.simulation.scene import Scene, random_views, simulate_detections
+from orthoscope.targets.detections import chessboard
 
 __all__ = ["undistorting"]
 
@@ -29,10 +31,11 @@ ROUNDS = 3
 SIZE = (1920, 1080)
 DISCORPY_TIMES = 3
 ABOUT = (
-    f"{COUNT} colour JPEG photographs of 1920x1080 ({PICTURES} rendered ones, copied), and a video of {FRAMES} such frames. Wall time of"
-    " the whole process, starting included, the best of several rounds; files in the page cache. OpenCV: a plain loop of imread, remap "
-    "(fixed maps, made once, as many threads as it likes) and imwrite in one process. discorpy: one grey photograph in memory, its "
-    "polynomial model, no file; ours with its map made anew each time."
+    f"{COUNT} colour JPEG photographs of 1920x1080 ({PICTURES} rendered ones, copied), and a video of"
+    f" {FRAMES} such frames. Wall time of the whole process, starting included, the best of several rounds;"
+    " files in the page cache. OpenCV: a plain loop of imread, remap (fixed maps, made once, as many threads"
+    " as it likes) and imwrite in one process. discorpy: one grey photograph in memory, its polynomial"
+    " model, no file; ours with its map made anew each time."
 )
 
 
@@ -46,13 +49,19 @@ def undistorting(peers: Peers, folder: Path) -> Part:
     files = _photographs(folder / "photographs", calibration)
     _race(part, folder, ("all cores, folder", saved, told, files, COUNT), [], 0.55)
     _race(part, folder, ("one job, folder", saved, told, files, COUNT), ["--jobs", "1"], None)
-    _race(part, folder, ("all cores, video", saved, told, _video(folder / "clip.mp4", files), FRAMES), [], None)
+    _race(
+        part, folder, ("all cores, video", saved, told, _video(folder / "clip.mp4", files), FRAMES), [], None
+    )
     _against_discorpy(part, peers, str(next(files.iterdir())), saved)
     return part
 
 
 def _calibration() -> Calibration:
-    camera = Camera(SIZE, Intrinsics(1360.0, 1357.0, 965.0, 535.0), Brown(k1=-0.31, k2=0.13, p1=0.0011, p2=-0.0007, k3=-0.025))
+    camera = Camera(
+        SIZE,
+        Intrinsics(1360.0, 1357.0, 965.0, 535.0),
+        Brown(k1=-0.31, k2=0.13, p1=0.0011, p2=-0.0007, k3=-0.025),
+    )
     target, rng = chessboard(14, 9, 0.02), np.random.default_rng(0)
     scene = Scene(camera, target, random_views(camera, target, 15, rng=rng))
     return fccm(simulate_detections(scene, noise_px=0.1, rng=rng), lens="brown")
@@ -60,14 +69,22 @@ def _calibration() -> Calibration:
 
 def _tell_opencv(camera: Camera, path: Path) -> None:
     matrix, straight = camera.intrinsics.matrix, camera.straight_intrinsics("all").matrix
-    np.savez(path, matrix=matrix, lens=camera.lens.coefficients[:5], straight=straight, image_size=np.array(camera.image_size))
+    np.savez(
+        path,
+        matrix=matrix,
+        lens=camera.lens.coefficients[:5],
+        straight=straight,
+        image_size=np.array(camera.image_size),
+    )
 
 
 def _photographs(folder: Path, calibration: Calibration) -> Path:
     """A folder of photographs, by the camera of the calibration."""
     folder.mkdir()
     scene = Scene(calibration.camera, chessboard(14, 9, 0.02), calibration.camera_from_target[:PICTURES])
-    pictures = [cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR) for _, grey in photographs(scene, rng=np.random.default_rng(0))]
+    pictures = [
+        cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR) for _, grey in photographs(scene, rng=np.random.default_rng(0))
+    ]
     for i in range(COUNT):
         if i < PICTURES:
             cv2.imwrite(str(folder / f"{i:03d}.jpg"), pictures[i])
@@ -85,13 +102,21 @@ def _video(path: Path, files: Path) -> Path:
     return path
 
 
-def _race(part: Part, folder: Path, what: tuple[str, Path, Path, Path, int], options: list[str], budget: float | None) -> None:
+def _race(
+    part: Part,
+    folder: Path,
+    what: tuple[str, Path, Path, Path, int],
+    options: list[str],
+    budget: float | None,
+) -> None:
     """One race of our verb against the loop; its row, or why there is none."""
     quantity, saved, told, source, count = what
     loop = HERE / "workers/opencv_folder.py"
 
     def ours() -> dict[str, Any]:
-        return _cleaned(folder / "ours", [ORTHOSCOPE, "undistort", saved, source, "-o", folder / "ours", *options])
+        return _cleaned(
+            folder / "ours", [ORTHOSCOPE, "undistort", saved, source, "-o", folder / "ours", *options]
+        )
 
     def theirs() -> dict[str, Any]:
         return _cleaned(folder / "theirs", [PEERS["OpenCV"].python, loop, told, source, folder / "theirs"])
@@ -117,7 +142,9 @@ def _against_discorpy(part: Part, peers: Peers, path: str, saved: Path) -> None:
     results = race(
         {
             "ours": lambda: peers.ask("orthoscope", "straighten", calibration=str(saved), **request),
-            "theirs": lambda: peers.ask("discorpy", "straighten", centre=[965.0, 535.0], factors=[1.0, 0.0, -1.6e-7], **request),
+            "theirs": lambda: peers.ask(
+                "discorpy", "straighten", centre=[965.0, 535.0], factors=[1.0, 0.0, -1.6e-7], **request
+            ),
         },
         rounds=ROUNDS,
     )
@@ -127,5 +154,13 @@ def _against_discorpy(part: Part, peers: Peers, path: str, saved: Path) -> None:
     else:
         per_photograph = (ours.cpu / DISCORPY_TIMES, theirs.cpu / DISCORPY_TIMES)
         part.rows.append(
-            Row("one grey photograph, map and all", per_photograph[0], "discorpy", per_photograph[1], "ms", None, "process CPU")
+            Row(
+                "one grey photograph, map and all",
+                per_photograph[0],
+                "discorpy",
+                per_photograph[1],
+                "ms",
+                None,
+                "process CPU",
+            )
         )

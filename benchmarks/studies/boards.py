@@ -14,7 +14,9 @@ from numpy import ndarray
 
 __all__ = ["SHAPES", "grid", "shaped", "size_of", "smooth_height"]
 
-Shape = Callable[[ndarray, np.random.Generator], ndarray]  # of corners (m,2), each coordinate from -1 to 1: their (m,3)
+Shape = Callable[
+    [ndarray, np.random.Generator], ndarray
+]  # of corners (m,2), each coordinate from -1 to 1: their (m,3)
 
 
 def grid(columns: int, rows: int, square: float) -> ndarray:
@@ -46,7 +48,9 @@ def shaped(points: ndarray, shape: dict[str, float], rng: np.random.Generator) -
     """Flat corners (m,3) displaced: each kind of SHAPES by its share of the board's size."""
     size = size_of(points)
     plane = 2.0 * (points[:, :2] - points[:, :2].mean(0)) / size
-    return points + sum((share * size * SHAPES[kind](plane, rng) for kind, share in shape.items()), np.zeros((len(points), 3)))
+    return points + sum(
+        (share * size * SHAPES[kind](plane, rng) for kind, share in shape.items()), np.zeros((len(points), 3))
+    )
 
 
 def smooth_height(points: ndarray, share: float, rng: np.random.Generator) -> ndarray:

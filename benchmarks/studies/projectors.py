@@ -71,7 +71,9 @@ class Projector:
     def _table(self) -> tuple[ndarray, ndarray]:
         theta, phi = np.meshgrid(np.linspace(0.0, WIDEST, POLAR), np.linspace(0.0, 2.0 * np.pi, AROUND))
         fine = theta.ravel() * (1.0 if self.fisheye else min(1.0, 1.2 * self._half_angle / WIDEST))
-        towards = np.stack([np.sin(fine) * np.cos(phi.ravel()), np.sin(fine) * np.sin(phi.ravel()), np.cos(fine)], 1)
+        towards = np.stack(
+            [np.sin(fine) * np.cos(phi.ravel()), np.sin(fine) * np.sin(phi.ravel()), np.cos(fine)], 1
+        )
         return towards, self.pixels(towards * 1e3)
 
     @property
@@ -83,9 +85,13 @@ class Projector:
         seen = np.full((len(points), 2), np.nan)
         ahead = points[:, 2] > 1e-9
         if ahead.any():
-            K = np.array([[self.focal[0], 0, self.centre[0]], [0, self.focal[1], self.centre[1]], [0, 0, 1.0]])
+            K = np.array(
+                [[self.focal[0], 0, self.centre[0]], [0, self.focal[1], self.centre[1]], [0, 0, 1.0]]
+            )
             lens = np.array(self.coefficients)
-            seen[ahead] = cv2.projectPoints(points[ahead], np.zeros(3), np.zeros(3), K, lens)[0].reshape(-1, 2)
+            seen[ahead] = cv2.projectPoints(points[ahead], np.zeros(3), np.zeros(3), K, lens)[0].reshape(
+                -1, 2
+            )
             seen[ahead] = np.where(self._unfolded(points[ahead])[:, None], seen[ahead], np.nan)
         return seen
 

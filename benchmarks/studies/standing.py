@@ -40,12 +40,16 @@ class Standing:
     roll: float = 180.0
 
 
-def stand(camera: Projector, points: ndarray, standing: Standing, rng: np.random.Generator) -> list[tuple[ndarray, ndarray]]:
+def stand(
+    camera: Projector, points: ndarray, standing: Standing, rng: np.random.Generator
+) -> list[tuple[ndarray, ndarray]]:
     """Rotation (3,3) and translation (3,) camera_from_target of each photograph."""
     return [_one(camera, points, standing, rng) for _ in range(standing.count)]
 
 
-def _one(camera: Projector, points: ndarray, standing: Standing, rng: np.random.Generator) -> tuple[ndarray, ndarray]:
+def _one(
+    camera: Projector, points: ndarray, standing: Standing, rng: np.random.Generator
+) -> tuple[ndarray, ndarray]:
     size, middle = np.array(camera.size), points.mean(0)
     for attempt in range(ATTEMPTS):
         nearer = standing.reach * 0.995**attempt
@@ -75,7 +79,10 @@ def _good(camera: Projector, points: ndarray, rotation: ndarray, least: float) -
 def _turned(rng: np.random.Generator, standing: Standing) -> ndarray:
     tilt, axis = np.deg2rad(rng.uniform(*standing.tilt)), rng.uniform(-np.pi, np.pi)
     roll = np.deg2rad(standing.roll) * rng.uniform(-1.0, 1.0)
-    return cv2.Rodrigues(tilt * np.array([np.cos(axis), np.sin(axis), 0.0]))[0] @ cv2.Rodrigues(np.array([0.0, 0.0, roll]))[0]
+    return (
+        cv2.Rodrigues(tilt * np.array([np.cos(axis), np.sin(axis), 0.0]))[0]
+        @ cv2.Rodrigues(np.array([0.0, 0.0, roll]))[0]
+    )
 
 
 def _facing(sight: ndarray) -> ndarray:

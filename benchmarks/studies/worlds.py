@@ -116,7 +116,9 @@ def _apart(camera: Projector, pixels: ndarray, rays: ndarray) -> float:
     for _ in range(8):
         turned = rays @ turn.T
         off = camera.pixels(turned) - pixels
-        by_turn = np.stack([(camera.pixels(turned @ _turn(step * axis).T) - pixels - off) / step for axis in np.eye(3)], -1)
+        by_turn = np.stack(
+            [(camera.pixels(turned @ _turn(step * axis).T) - pixels - off) / step for axis in np.eye(3)], -1
+        )
         good = np.isfinite(off).all(1) & np.isfinite(by_turn).all((1, 2))
         if good.sum() < 6:
             return float("inf")
@@ -142,7 +144,9 @@ def _motion(recipe: Recipe, translation: ndarray, rng: np.random.Generator) -> n
     return recipe.shutter * width * rng.normal(size=3) * [1.0, 1.0, 0.0]
 
 
-def _seen(camera: Projector, points: ndarray, rotation: ndarray, translation: ndarray, motion: ndarray) -> ndarray:
+def _seen(
+    camera: Projector, points: ndarray, rotation: ndarray, translation: ndarray, motion: ndarray
+) -> ndarray:
     at = points @ rotation.T + translation
     pixels = camera.pixels(at)
     if motion.any():
@@ -154,13 +158,19 @@ def _seen(camera: Projector, points: ndarray, rotation: ndarray, translation: nd
 
 def _noise(recipe: Recipe, flat: ndarray, rng: np.random.Generator) -> ndarray:
     shape = (len(flat), 2)
-    white = rng.standard_t(recipe.tails, shape) / np.sqrt(recipe.tails / (recipe.tails - 2)) if recipe.tails else rng.normal(size=shape)
+    white = (
+        rng.standard_t(recipe.tails, shape) / np.sqrt(recipe.tails / (recipe.tails - 2))
+        if recipe.tails
+        else rng.normal(size=shape)
+    )
     if not recipe.alike:
         return recipe.noise * white
     x, y = (flat[:, :2] - flat[:, :2].mean(0)).T / np.ptp(flat[:, 0]) * 2.0
     waves = np.stack([x * x, x * y, y * y, x**3, x * x * y, x * y * y, y**3], 1)
     waves = np.linalg.qr(waves)[0] * np.sqrt(len(flat))
-    return recipe.noise * white + recipe.alike * waves @ rng.normal(size=(waves.shape[1], 2)) / np.sqrt(waves.shape[1])
+    return recipe.noise * white + recipe.alike * waves @ rng.normal(size=(waves.shape[1], 2)) / np.sqrt(
+        waves.shape[1]
+    )
 
 
 # Cameras: the true camera and the poses to the camera of each photograph, its group, and its pose.
@@ -170,7 +180,9 @@ Cameras = Callable[[Projector, Poses, float, np.random.Generator], tuple[list[Pr
 
 
 def _alternately(other: Callable[[Projector, float], Projector]) -> Cameras:
-    def two(camera: Projector, poses: Poses, amount: float, rng: np.random.Generator) -> tuple[list[Projector], list[int], Poses]:
+    def two(
+        camera: Projector, poses: Poses, amount: float, rng: np.random.Generator
+    ) -> tuple[list[Projector], list[int], Poses]:
         group = rng.permutation(np.arange(len(poses)) % 2).tolist()
         return [other(camera, amount) if g else camera for g in group], group, poses
 
@@ -178,21 +190,35 @@ def _alternately(other: Callable[[Projector, float], Projector]) -> Cameras:
 
 
 def _each(other: Callable[[Projector, float, np.random.Generator], Projector]) -> Cameras:
-    return lambda camera, poses, amount, rng: ([other(camera, amount, rng) for _ in poses], list(range(len(poses))), poses)
+    return lambda camera, poses, amount, rng: (
+        [other(camera, amount, rng) for _ in poses],
+        list(range(len(poses))),
+        poses,
+    )
 
 
-def _copies(camera: Projector, poses: Poses, amount: float, rng: np.random.Generator) -> tuple[list[Projector], list[int], Poses]:
+def _copies(
+    camera: Projector, poses: Poses, amount: float, rng: np.random.Generator
+) -> tuple[list[Projector], list[int], Poses]:
     """The same pictures again, straightened by another program."""
-    straight = replace(camera, coefficients=(0.0, 0.0, 0.0, 0.0), fisheye=False, focal=(camera.focal[0] * (1 - amount),) * 2)
+    straight = replace(
+        camera, coefficients=(0.0, 0.0, 0.0, 0.0), fisheye=False, focal=(camera.focal[0] * (1 - amount),) * 2
+    )
     return [camera] * len(poses) + [straight] * len(poses), [0] * len(poses) + [1] * len(poses), poses * 2
 
 
 CAMERAS: dict[str, Cameras] = {
     "one": lambda camera, poses, _, rng: ([camera] * len(poses), [0] * len(poses), poses),
     "zoom": _alternately(lambda camera, ratio: camera.zoomed(1.0 + ratio)),
-    "other": _alternately(lambda camera, share: camera.shifted(share * camera.size[0], share * camera.size[0])),
+    "other": _alternately(
+        lambda camera, share: camera.shifted(share * camera.size[0], share * camera.size[0])
+    ),
     "turned": _alternately(lambda camera, _: replace(camera, turned=True)),
-    "lenses": _alternately(lambda camera, share: replace(camera, coefficients=tuple(k * (1 - share) for k in camera.coefficients))),
+    "lenses": _alternately(
+        lambda camera, share: replace(
+            camera, coefficients=tuple(k * (1 - share) for k in camera.coefficients)
+        )
+    ),
     "breathing": _each(lambda camera, share, rng: camera.zoomed(1.0 + share * rng.normal())),
     "stabiliser": _each(lambda camera, px, rng: camera.shifted(*(px * rng.normal(size=2)))),
     "copies": _copies,
@@ -204,19 +230,25 @@ CAMERAS: dict[str, Cameras] = {
 Detector = Callable[[list[Photograph], float, Recipe, np.random.Generator], list[Photograph]]
 
 
-def _wild(photographs: list[Photograph], share: float, recipe: Recipe, rng: np.random.Generator) -> list[Photograph]:
+def _wild(
+    photographs: list[Photograph], share: float, recipe: Recipe, rng: np.random.Generator
+) -> list[Photograph]:
     """A share of all corners is anywhere within 40 px."""
     wild = []
     for photo in photographs:
         off = rng.random(len(photo.ids)) < share
-        wild.append(photo._replace(pixels=photo.pixels + off[:, None] * rng.uniform(-40.0, 40.0, (len(off), 2))))
+        wild.append(
+            photo._replace(pixels=photo.pixels + off[:, None] * rng.uniform(-40.0, 40.0, (len(off), 2)))
+        )
     return wild
 
 
 def _first(change: Callable[[Photograph, Recipe, np.random.Generator], Photograph]) -> Detector:
     """Some of the photographs, `amount` of them, are changed."""
 
-    def detector(photographs: list[Photograph], amount: float, recipe: Recipe, rng: np.random.Generator) -> list[Photograph]:
+    def detector(
+        photographs: list[Photograph], amount: float, recipe: Recipe, rng: np.random.Generator
+    ) -> list[Photograph]:
         chosen = set(rng.permutation(len(photographs))[: int(amount)].tolist())
         return [change(photo, recipe, rng) if i in chosen else photo for i, photo in enumerate(photographs)]
 
@@ -259,10 +291,16 @@ def _another_board(photo: Photograph, recipe: Recipe, rng: np.random.Generator) 
     return photo._replace(pixels=photo.pixels + 0.1 * step * (across % 2)[:, None] * [1.0, 0.0])
 
 
-def _copied(photographs: list[Photograph], amount: float, recipe: Recipe, rng: np.random.Generator) -> list[Photograph]:
+def _copied(
+    photographs: list[Photograph], amount: float, recipe: Recipe, rng: np.random.Generator
+) -> list[Photograph]:
     """Every photograph `amount` times, from a tripod: the same but for noise."""
     return [
-        Photograph(f"{photo.image[:-4]}-{k}.jpg", photo.ids, photo.pixels + 0.2 * recipe.noise * rng.normal(size=photo.pixels.shape))
+        Photograph(
+            f"{photo.image[:-4]}-{k}.jpg",
+            photo.ids,
+            photo.pixels + 0.2 * recipe.noise * rng.normal(size=photo.pixels.shape),
+        )
         for photo in photographs
         for k in range(int(amount))
     ]

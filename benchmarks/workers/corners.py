@@ -16,10 +16,12 @@ __all__ = ["Corners", "Fit", "tasks_of"]
 
 
 class Corners(NamedTuple):
-    """Detections in plain arrays; focal and fov_x are what a user would tell a peer that asks for a first guess.
+    """Detections in plain arrays; focal and fov_x are what a user would tell a peer that asks for a first
+    guess.
 
-    points: (m,3) of the target.  grid: (columns, rows) where they make one, else None.  ids, pixels: one entry for each view.
-    starts: rotation (3,3) and translation (3,) of each view, camera from target, from which held-out poses are refitted.
+    points: (m,3) of the target. grid: (columns, rows) where they make one, else None. ids, pixels: one entry
+    for each view. starts: rotation (3,3) and translation (3,) of each view, camera from target, from which
+    held-out poses are refitted.
     """
 
     points: np.ndarray
@@ -54,7 +56,8 @@ class Corners(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """A camera: `project` takes points (n,3) of the camera frame to pixels; points: (m,3), the target as this peer believes it to be.
+    """A camera: `project` takes points (n,3) of the camera frame to pixels; points: (m,3), the target as this
+    peer believes it to be.
 
     rms: over the corners that it was fitted to, px per point.
     """
@@ -64,7 +67,9 @@ class Fit(NamedTuple):
     rms: float
 
 
-def tasks_of(kinds: Mapping[str, Callable[[Corners], Fit]], version: Callable[[], str]) -> dict[str, Callable[..., dict[str, Any]]]:
+def tasks_of(
+    kinds: Mapping[str, Callable[[Corners], Fit]], version: Callable[[], str]
+) -> dict[str, Callable[..., dict[str, Any]]]:
     """What every worker that calibrates can be asked; kinds: its calibrations by name."""
     loaded: dict[str, Corners] = {}
 
@@ -83,7 +88,9 @@ def tasks_of(kinds: Mapping[str, Callable[[Corners], Fit]], version: Callable[[]
 
 
 def _held_out(corners: Corners, fit: Callable[[Corners], Fit], folds: list[list[int]]) -> dict[str, Any]:
-    """Lengths (px) of the residuals in each view of the folds, from fits that did not see it; NaN where the fit failed, and why."""
+    """Lengths (px) of the residuals in each view of the folds, from fits that did not see it; NaN where the
+    fit failed, and why.
+    """
     lengths: dict[int, list[float]] = {}
     failed: list[str] = []
     for fold in folds:
@@ -94,6 +101,8 @@ def _held_out(corners: Corners, fit: Callable[[Corners], Fit], folds: list[list[
             lengths |= {i: [float("nan")] * len(corners.ids[i]) for i in fold}
             continue
         for i in fold:
-            error = refit_pose(fitted.project, fitted.points[corners.ids[i]], corners.pixels[i], corners.starts[i])
+            error = refit_pose(
+                fitted.project, fitted.points[corners.ids[i]], corners.pixels[i], corners.starts[i]
+            )
             lengths[i] = np.hypot(*error.T).tolist()
     return {"lengths": [lengths[i] for fold in folds for i in fold], "failed_folds": failed}

@@ -15,7 +15,8 @@ Finder = Callable[[np.ndarray, tuple[int, int]], "np.ndarray | None"]
 
 
 def finding(finders: Mapping[str, Finder]) -> Callable[..., dict[str, Any]]:
-    """The task `find`: for each file its corners in the finder's own order, [] where there is no board; time without reading.
+    """The task `find`: for each file its corners in the finder's own order, [] where there is no board; time
+    without reading.
 
     The sums are of all files; `each` is the CPU time of one after the other.
     """

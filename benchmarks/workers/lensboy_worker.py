@@ -1,4 +1,5 @@
-"""lensboy as a peer: OpenCV's formulas and a spline, with its target warp and outlier filter as they are by default.
+"""lensboy as a peer: OpenCV's formulas and a spline, with its target warp and outlier filter as they are by
+default.
 
 `plain` leaves warp and filter out: then it solves the problem that everybody else solves.
 """
@@ -21,13 +22,17 @@ PLAIN: dict[str, Any] = {"estimate_target_warp": False, "outlier_threshold_stdde
 
 def _opencv(corners: Corners, coefficients: Any, **settings: Any) -> Fit:
     width, height = corners.image_size
-    config = lensboy.OpenCVConfig(image_width=width, image_height=height, included_distortion_coefficients=coefficients)
+    config = lensboy.OpenCVConfig(
+        image_width=width, image_height=height, included_distortion_coefficients=coefficients
+    )
     return _fit(corners, config, **settings)
 
 
 def _spline(corners: Corners, **settings: Any) -> Fit:
     width, height = corners.image_size
-    config = lensboy.PinholeSplinedConfig(image_width=width, image_height=height, num_knots_x=KNOTS[0], num_knots_y=KNOTS[1])
+    config = lensboy.PinholeSplinedConfig(
+        image_width=width, image_height=height, num_knots_x=KNOTS[0], num_knots_y=KNOTS[1]
+    )
     return _fit(corners, config, **settings)
 
 
@@ -35,7 +40,9 @@ def _fit(corners: Corners, config: Any, **settings: Any) -> Fit:
     frames = [lensboy.Frame(ids, pixels) for ids, pixels in zip(corners.ids, corners.pixels, strict=True)]
     result = lensboy.calibrate_camera(corners.points, frames, config, **settings)
     points = result.target_warp.warp_target(corners.points) if result.target_warp else corners.points
-    squares = np.concatenate([(one.residuals**2).sum(1)[one.inlier_mask] for one in result.frame_diagnostics if one])
+    squares = np.concatenate(
+        [(one.residuals**2).sum(1)[one.inlier_mask] for one in result.frame_diagnostics if one]
+    )
     return Fit(partial(_project, model=result.camera_model), points, float(np.sqrt(squares.mean())))
 
 

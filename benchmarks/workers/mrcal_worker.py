@@ -1,7 +1,9 @@
-"""mrcal as a peer, in the steps of its own mrcal-calibrate-cameras: stereographic seed, lens, then everything with the board's warp.
+"""mrcal as a peer, in the steps of its own mrcal-calibrate-cameras: stereographic seed, lens, then everything
+with the board's warp.
 
-Regularisation and outlier rejection are as they are by default; the seed's random coefficients come from a fixed seed.  `plain` leaves
-warp, outlier rejection and the last repeated solve out: then it solves the problem that everybody else solves.
+Regularisation and outlier rejection are as they are by default; the seed's random coefficients come from a
+fixed seed. `plain` leaves warp, outlier rejection and the last repeated solve out: then it solves the problem
+that everybody else solves.
 """
 
 from __future__ import annotations
@@ -44,14 +46,22 @@ def _fit(corners: Corners, lens: str, *, plain: bool = False) -> Fit:
     problem = _seeded(corners, board)
     mrcal.optimize(**problem, **_plainly(core=False))
     mrcal.optimize(**problem, **_plainly(core=True))
-    problem.update(lensmodel=lens, intrinsics=_widened(problem["intrinsics"], lens), **_finally(core=not _is_splined(lens)))
+    problem.update(
+        lensmodel=lens,
+        intrinsics=_widened(problem["intrinsics"], lens),
+        **_finally(core=not _is_splined(lens)),
+    )
     problem.update(do_apply_outlier_rejection=not plain)
     stats = mrcal.optimize(**problem)
     if not plain:
         problem.update(calobject_warp=np.zeros(2), do_optimize_calobject_warp=True)
         stats = mrcal.optimize(**problem)
     project = partial(_project, lens=lens, intrinsics=problem["intrinsics"][0])
-    return Fit(project, board.points(problem.get("calobject_warp")), float(np.sqrt(2.0) * stats["rms_reproj_error__pixels"]))
+    return Fit(
+        project,
+        board.points(problem.get("calobject_warp")),
+        float(np.sqrt(2.0) * stats["rms_reproj_error__pixels"]),
+    )
 
 
 def _project(points: np.ndarray, *, lens: str, intrinsics: np.ndarray) -> np.ndarray:
@@ -80,7 +90,9 @@ def _seeded(corners: Corners, board: _Board) -> dict[str, Any]:
         "frames_rt_toref": frames,
         "points": None,
         "observations_board": observations,
-        "indices_frame_camintrinsics_camextrinsics": np.column_stack([view_camera, view_camera[:, 1] - 1]).astype(np.int32),
+        "indices_frame_camintrinsics_camextrinsics": (
+            np.column_stack([view_camera, view_camera[:, 1] - 1]).astype(np.int32)
+        ),
         "observations_point": None,
         "indices_point_camintrinsics_camextrinsics": None,
         "lensmodel": "LENSMODEL_STEREOGRAPHIC",
@@ -125,7 +137,9 @@ def _widened(intrinsics: np.ndarray, lens: str) -> np.ndarray:
 
 
 def _version() -> str:
-    package = subprocess.run(["dpkg-query", "-W", "-f", "${Version}", "mrcal"], capture_output=True, text=True, check=False).stdout
+    package = subprocess.run(
+        ["dpkg-query", "-W", "-f", "${Version}", "mrcal"], capture_output=True, text=True, check=False
+    ).stdout
     return f"mrcal {package or 'of unknown version'}"
 
 

@@ -11,7 +11,9 @@ from served import serve
 
 
 def find(paths: list[str], grid: list[int], kind: str) -> dict[str, Any]:
-    """For each file its corners, [] where there is no board; time of the command, which reads the files too."""
+    """For each file its corners, [] where there is no board; time of the command, which reads the
+    files too.
+    """
     if grid[0] != grid[1]:
         raise ValueError(f"mrgingham finds square boards only, not {grid[0]}x{grid[1]}")
     before, start = os.times(), time.perf_counter()

@@ -1,4 +1,5 @@
-"""The loop that a user would write: photographs of a folder, or frames of a video, made straight with OpenCV, one process.
+"""The loop that a user would write: photographs of a folder, or frames of a video, made straight with OpenCV,
+one process.
 
 python opencv_folder.py CAMERA.npz FOLDER_OR_VIDEO OUT
 """
@@ -23,7 +24,9 @@ def straight_folder(folder: Path, out: Path, maps: tuple[np.ndarray, np.ndarray]
 def straight_video(path: Path, out: Path, maps: tuple[np.ndarray, np.ndarray], size: tuple[int, int]) -> None:
     """read, remap, write."""
     clip = cv2.VideoCapture(str(path))
-    written = cv2.VideoWriter(str(out / path.name), cv2.VideoWriter.fourcc(*"mp4v"), clip.get(cv2.CAP_PROP_FPS), size)
+    written = cv2.VideoWriter(
+        str(out / path.name), cv2.VideoWriter.fourcc(*"mp4v"), clip.get(cv2.CAP_PROP_FPS), size
+    )
     while True:
         there, frame = clip.read()
         if not there:

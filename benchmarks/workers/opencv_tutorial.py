@@ -1,4 +1,6 @@
-"""The script that a user would write after OpenCV's tutorial: a folder of photographs of a 9x6 chessboard, a camera."""
+"""The script that a user would write after OpenCV's tutorial: a folder of photographs of a 9x6 chessboard, a
+camera.
+"""
 
 from __future__ import annotations
 

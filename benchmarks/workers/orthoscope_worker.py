@@ -12,8 +12,8 @@ from corners import Corners, Fit, tasks_of
 from served import serve, timed
 
 from orthoscope import METHODS, Calibration, Camera, Detections, Intrinsics, View
-from orthoscope.geometry.target import Target
 from orthoscope.models.lenses import Brown
+from orthoscope.targets.detections import Target
 from orthoscope.version import __version__
 
 SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {  # what is called for each name that the parts use
@@ -42,7 +42,10 @@ def _calibration(corners: Corners, kind: str) -> Calibration:
 
 def _detections(corners: Corners) -> Detections:
     target = Target("benchmark", corners.points, grid=corners.grid)
-    views = [View(f"{i}", ids, pixels) for i, (ids, pixels) in enumerate(zip(corners.ids, corners.pixels, strict=True))]
+    views = [
+        View(f"{i}", ids, pixels)
+        for i, (ids, pixels) in enumerate(zip(corners.ids, corners.pixels, strict=True))
+    ]
     return Detections(target, corners.image_size, tuple(views))
 
 
@@ -78,7 +81,7 @@ def find(**request: Any) -> dict[str, Any]:
     import cv2
     from found import finding
 
-    from orthoscope.io.chessboard import find_chessboard
+    from orthoscope.detection.chessboard import find_chessboard
 
     cv2.setNumThreads(1)
     return finding({"orthoscope": lambda grey, grid: find_chessboard(grey, *grid)})(**request)
@@ -96,5 +99,15 @@ def straighten(path: str, times: int, calibration: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    tasks = tasks_of({name: partial(_fit, kind=name) for name in SETTINGS}, lambda: f"orthoscope {__version__}")
-    serve({**tasks, "covariance": covariance, "undistort_points": undistort_points, "find": find, "straighten": straighten})
+    tasks = tasks_of(
+        {name: partial(_fit, kind=name) for name in SETTINGS}, lambda: f"orthoscope {__version__}"
+    )
+    serve(
+        {
+            **tasks,
+            "covariance": covariance,
+            "undistort_points": undistort_points,
+            "find": find,
+            "straighten": straighten,
+        }
+    )

@@ -1,7 +1,8 @@
-"""Where a view's target was, the camera being fixed: one piece of code for every peer, so that nobody's own refit flatters him.
+"""Where a view's target was, the camera being fixed: one piece of code for every peer, so that nobody's own
+refit flatters him.
 
-Plain numpy, because it runs inside every peer's environment.  Levenberg-Marquardt over six numbers, the Jacobian by central differences
-through the peer's own `project`.
+Plain numpy, because it runs inside every peer's environment. Levenberg-Marquardt over six numbers, the
+Jacobian by central differences through the peer's own `project`.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ ENOUGH = 1e-14  # relative fall of the cost below which nothing more is to be ha
 Project = Callable[[np.ndarray], np.ndarray]
 
 
-def refit_pose(project: Project, points: np.ndarray, pixels: np.ndarray, start: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+def refit_pose(
+    project: Project, points: np.ndarray, pixels: np.ndarray, start: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
     """Residuals (n,2), predicted minus detected, pixels, at the pose of least squares.
 
-    project: points (n,3) of the camera frame to pixels.  points: (n,3) of the target, as the peer believes them to be.
-    start: rotation (3,3) and translation (3,), camera from target.
+    project: points (n,3) of the camera frame to pixels. points: (n,3) of the target, as the peer believes
+    them to be. start: rotation (3,3) and translation (3,), camera from target.
     """
     rotation, translation = (np.asarray(part, dtype=float) for part in start)
     damping, error = 1e-3, project(points @ rotation.T + translation) - pixels
@@ -64,6 +67,9 @@ def _slopes(project: Project, turned: np.ndarray, translation: np.ndarray) -> np
     for i in range(6):
         step = np.zeros(6)
         step[i] = size[i]
-        ends = [project(turned @ rotation_of(sign * step[:3]).T + translation + sign * step[3:]) for sign in (1.0, -1.0)]
+        ends = [
+            project(turned @ rotation_of(sign * step[:3]).T + translation + sign * step[3:])
+            for sign in (1.0, -1.0)
+        ]
         columns.append((ends[0] - ends[1]).ravel() / (2.0 * size[i]))
     return np.stack(columns, axis=-1)

@@ -1,7 +1,9 @@
-"""A worker: reads one request a line, does it, answers on one line; the benchmarks talk to every environment this way.
+"""A worker: reads one request a line, does it, answers on one line; the benchmarks talk to every environment
+this way.
 
-Plain numpy and the standard library, because it runs inside every peer's environment.  A request is a JSON object with "task"; an answer is
-what the task returns, or {"failed": why}.  Whatever a peer prints goes to stderr, so that it cannot garble an answer.
+Plain numpy and the standard library, because it runs inside every peer's environment. A request is a JSON
+object with "task"; an answer is what the task returns, or {"failed": why}. Whatever a peer prints goes to
+stderr, so that it cannot garble an answer.
 """
 
 from __future__ import annotations

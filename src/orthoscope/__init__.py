@@ -17,61 +17,61 @@ from typing import TYPE_CHECKING, Any
 from orthoscope.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from orthoscope.evaluation.compare import Comparison as Comparison
-    from orthoscope.evaluation.compare import compare as compare
-    from orthoscope.evaluation.difference import image_difference as image_difference
+    from orthoscope.detection.detect import detect as detect
+    from orthoscope.evaluation.comparison.compare import Comparison as Comparison
+    from orthoscope.evaluation.comparison.compare import compare as compare
     from orthoscope.evaluation.evaluate import Evaluation as Evaluation
     from orthoscope.evaluation.evaluate import evaluate as evaluate
     from orthoscope.evaluation.metrics import normalised_calibration_error as normalised_calibration_error
-    from orthoscope.evaluation.render import render as render
-    from orthoscope.evaluation.simulate import Scene as Scene
-    from orthoscope.evaluation.simulate import simulate_detections as simulate_detections
+    from orthoscope.files.images import read_image as read_image
+    from orthoscope.files.images import write_image as write_image
+    from orthoscope.fitting.calibration import Calibration as Calibration
+    from orthoscope.fitting.held_out import held_out as held_out
+    from orthoscope.fitting.resection import resect as resect
+    from orthoscope.formats.export import export as export
+    from orthoscope.formats.own.json import load as load
+    from orthoscope.formats.own.json import load_camera as load_camera
+    from orthoscope.formats.own.json import save as save
     from orthoscope.geometry.arrays import CalibrationError as CalibrationError
     from orthoscope.geometry.arrays import InputError as InputError
     from orthoscope.geometry.pose import Pose as Pose
-    from orthoscope.geometry.target import Detections as Detections
-    from orthoscope.geometry.target import Target as Target
-    from orthoscope.geometry.target import View as View
-    from orthoscope.geometry.target import chessboard as chessboard
-    from orthoscope.geometry.target import parse_target as parse_target
-    from orthoscope.io.detect import detect as detect
-    from orthoscope.io.export import export as export
-    from orthoscope.io.images import read_image as read_image
-    from orthoscope.io.images import write_image as write_image
-    from orthoscope.io.own_json import load as load
-    from orthoscope.io.own_json import load_camera as load_camera
-    from orthoscope.io.own_json import save as save
-    from orthoscope.io.undistort import undistort as undistort
     from orthoscope.methods import METHODS as METHODS
     from orthoscope.methods import calibrate as calibrate
-    from orthoscope.methods.calibration import Calibration as Calibration
-    from orthoscope.methods.held_out import held_out as held_out
-    from orthoscope.methods.resection import resect as resect
     from orthoscope.models.camera import Camera as Camera
     from orthoscope.models.camera import Intrinsics as Intrinsics
+    from orthoscope.models.difference import image_difference as image_difference
     from orthoscope.models.lenses import LENSES as LENSES
     from orthoscope.models.target_shape import TargetShape as TargetShape
     from orthoscope.report.page import write_report as write_report
+    from orthoscope.simulation.render import render as render
+    from orthoscope.simulation.scene import Scene as Scene
+    from orthoscope.simulation.scene import simulate_detections as simulate_detections
+    from orthoscope.straight.undistort import undistort as undistort
+    from orthoscope.targets.detections import Detections as Detections
+    from orthoscope.targets.detections import Target as Target
+    from orthoscope.targets.detections import View as View
+    from orthoscope.targets.detections import chessboard as chessboard
+    from orthoscope.targets.detections import parse_target as parse_target
 
 ROOMS = {
-    "evaluation.compare": ("Comparison", "compare"),
-    "evaluation.difference": ("image_difference",),
+    "evaluation.comparison.compare": ("Comparison", "compare"),
+    "models.difference": ("image_difference",),
     "evaluation.evaluate": ("Evaluation", "evaluate"),
     "evaluation.metrics": ("normalised_calibration_error",),
-    "evaluation.render": ("render",),
-    "evaluation.simulate": ("Scene", "simulate_detections"),
+    "simulation.render": ("render",),
+    "simulation.scene": ("Scene", "simulate_detections"),
     "geometry.arrays": ("CalibrationError", "InputError"),
     "geometry.pose": ("Pose",),
-    "geometry.target": ("Detections", "Target", "View", "chessboard", "parse_target"),
-    "io.detect": ("detect",),
-    "io.export": ("export",),
-    "io.images": ("read_image", "write_image"),
-    "io.own_json": ("load", "load_camera", "save"),
-    "io.undistort": ("undistort",),
+    "targets.detections": ("Detections", "Target", "View", "chessboard", "parse_target"),
+    "detection.detect": ("detect",),
+    "formats.export": ("export",),
+    "files.images": ("read_image", "write_image"),
+    "formats.own.json": ("load", "load_camera", "save"),
+    "straight.undistort": ("undistort",),
     "methods": ("METHODS", "calibrate"),
-    "methods.calibration": ("Calibration",),
-    "methods.held_out": ("held_out",),
-    "methods.resection": ("resect",),
+    "fitting.calibration": ("Calibration",),
+    "fitting.held_out": ("held_out",),
+    "fitting.resection": ("resect",),
     "models.camera": ("Camera", "Intrinsics"),
     "models.lenses": ("LENSES",),
     "models.target_shape": ("TargetShape",),

@@ -1,4 +1,6 @@
-"""The command line as a user meets it: arguments in, exit code and printed text out; and photographs for it to work on."""
+"""The command line as a user meets it: arguments in, exit code and printed text out; and photographs for it
+to work on.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,12 @@ import numpy as np
 import pytest
 
 from orthoscope.cli import main
-from orthoscope.evaluation.render import Renderer, photographs
-from orthoscope.evaluation.simulate import Scene, random_views
-from orthoscope.geometry.target import chessboard
-from orthoscope.io.images import write_image
+from orthoscope.files.images import write_image
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
+from orthoscope.simulation.render import Renderer, photographs
+from orthoscope.simulation.scene import Scene, random_views
+from orthoscope.targets.detections import chessboard
 
 
 class Run(NamedTuple):
@@ -48,7 +50,11 @@ def scene() -> Scene:
     camera = Camera((640, 480), Intrinsics(520.0, 518.0, 324.0, 236.0), Brown(k1=-0.25, k2=0.08, p1=0.001))
     target = chessboard(9, 6, 0.025)
     rng = np.random.default_rng(3)
-    return Scene(camera, target, random_views(camera, target, 10, rng=rng, roll=(-0.3, 0.3), fill=(0.5, 0.9), margin=0.025))
+    return Scene(
+        camera,
+        target,
+        random_views(camera, target, 10, rng=rng, roll=(-0.3, 0.3), fill=(0.5, 0.9), margin=0.025),
+    )
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,6 @@
-"""Bad input: a message that says what was got, what was expected and what to do; the right exit code; nothing half-written."""
+"""Bad input: a message that says what was got, what was expected and what to do; the right exit code; nothing
+half-written.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +16,9 @@ import cv2
 import numpy as np
 import pytest
 
-from orthoscope.evaluation.simulate import Scene, simulate_detections
+from orthoscope.formats.own.json import load_detections, save
 from orthoscope.geometry.pose import Pose
-from orthoscope.io.own_json import load_detections, save
+from orthoscope.simulation.scene import Scene, simulate_detections
 
 TARGET = "chessboard:9x6:25mm"
 
@@ -62,7 +64,15 @@ def test_a_wrong_command_says_so_and_leaves_with_2(run, tmp_path, monkeypatch, a
 
 
 @pytest.mark.parametrize(
-    "options", ["--lens fisheye", "--lens brown:k9", "--method magic", "--method fccm --loss soft", "--shape wavy", "--export nothing"]
+    "options",
+    [
+        "--lens fisheye",
+        "--lens brown:k9",
+        "--method magic",
+        "--method fccm --loss soft",
+        "--shape wavy",
+        "--export nothing",
+    ],
 )
 def test_an_unknown_name_lists_the_known_ones(run, calibrated, tmp_path, options):
     told = calibrate(run, calibrated / "detections.json", *options.split(), out=tmp_path / "out")
@@ -110,8 +120,12 @@ def test_photographs_without_a_board_leave_with_1(run, tmp_path):
 
 
 def test_views_all_parallel_leave_with_1_and_print_no_camera(run, scene, tmp_path):
-    facing = tuple(Pose(np.eye(3), np.array([0.05 * i - 0.2, 0.03 * i - 0.15, 0.35 + 0.02 * i])) for i in range(8))
-    parallel = simulate_detections(Scene(scene.camera, scene.target, facing), noise_px=0.1, rng=np.random.default_rng(0))
+    facing = tuple(
+        Pose(np.eye(3), np.array([0.05 * i - 0.2, 0.03 * i - 0.15, 0.35 + 0.02 * i])) for i in range(8)
+    )
+    parallel = simulate_detections(
+        Scene(scene.camera, scene.target, facing), noise_px=0.1, rng=np.random.default_rng(0)
+    )
     save(parallel, tmp_path / "detections.json")
     told = calibrate(run, tmp_path / "detections.json", out=tmp_path / "out")
     assert told.code == 1

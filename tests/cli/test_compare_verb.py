@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orthoscope.evaluation.entrants import USUAL
-from orthoscope.io.own_json import load_detections, save
+from orthoscope.evaluation.comparison.entry import USUAL
+from orthoscope.formats.own.json import load_detections, save
 
 FILES = {"compare.json", "compare.html", "compare.svg"}
 THREE = ("--with", "fccm:brown", "--with", "fccm:brown:k1", "--with", "mldc")
@@ -21,7 +21,20 @@ def test_it_prints_a_table_the_best_first_and_what_follows(run, calibrated, tmp_
     assert told.code == 0, told.err
     views, headings, *rows = told.out.splitlines()
     assert views == "views      10 used, 0 set aside; 540 corners; 5 folds held out"
-    assert headings.split() == ["held", "out", "(px)", "loses", "(px)", "NCE", "used", "(px)", "parameters", "seconds", "lens", "target"]
+    assert headings.split() == [
+        "held",
+        "out",
+        "(px)",
+        "loses",
+        "(px)",
+        "NCE",
+        "used",
+        "(px)",
+        "parameters",
+        "seconds",
+        "lens",
+        "target",
+    ]
     assert [row.split()[0] for row in rows[:3]] == ["fccm:brown", "fccm:brown:k1", "mldc"]
     assert re.fullmatch(r"fccm:brown +0\.\d+ ± 0\.\d+ +best( +[\d.]+){4} +brown +flat", rows[0])
     assert "verdict    fccm:brown foresees these photographs best" in told.out
@@ -36,10 +49,17 @@ def test_its_json_has_every_number_of_every_entrant_and_is_the_file(run, calibra
     assert (tmp_path / "compare.json").read_text() == told.out
     assert (numbers["corners"], numbers["folds"], len(numbers["views"])) == (540, 3, 10)
     best, worse, _ = numbers["compared"]
-    assert (best["name"], best["method"], best["settings"], best["target"]) == ("fccm:brown", "fccm", {"lens": "brown"}, "flat")
+    assert (best["name"], best["method"], best["settings"], best["target"]) == (
+        "fccm:brown",
+        "fccm",
+        {"lens": "brown"},
+        "flat",
+    )
     assert best["loses_px"] == best["loses_error_px"] == 0.0
     assert worse["loses_px"] == pytest.approx(worse["held_out_rms_px"] - best["held_out_rms_px"])
-    assert np.sqrt(np.mean(np.square(best["views_held_out_rms_px"]))) == pytest.approx(best["held_out_rms_px"])  # whole boards: equal views
+    assert np.sqrt(np.mean(np.square(best["views_held_out_rms_px"]))) == pytest.approx(
+        best["held_out_rms_px"]
+    )  # whole boards: equal views
     assert all(best[key] > 0 for key in ("held_out_error_px", "nce", "rms_px", "parameters", "seconds"))
     assert best["failure"] is None
     assert numbers["conclusions"][0].startswith("fccm:brown foresees")
@@ -48,7 +68,16 @@ def test_its_json_has_every_number_of_every_entrant_and_is_the_file(run, calibra
 def test_one_that_cannot_is_told_with_the_reason_and_the_others_are_compared(run, calibrated, tmp_path):
     detections = load_detections(calibrated / "detections.json")
     save(replace(detections, target=replace(detections.target, lines=())), tmp_path / "scattered.json")
-    told = run("compare", tmp_path / "scattered.json", "--with", "nmldc", "--with", "fccm:brown:k1", "-o", tmp_path / "out")
+    told = run(
+        "compare",
+        tmp_path / "scattered.json",
+        "--with",
+        "nmldc",
+        "--with",
+        "fccm:brown:k1",
+        "-o",
+        tmp_path / "out",
+    )
     assert told.code == 0, told.err
     assert re.search(r"^cannot     nmldc: .*straightness cannot be judged", told.out, re.MULTILINE)
     assert "verdict    fccm:brown:k1 foresees" in told.out
@@ -92,7 +121,19 @@ def test_too_few_photographs_leave_with_1(run, calibrated, tmp_path):
 
 @pytest.mark.slow
 def test_left_alone_it_compares_every_method_in_two_processes_on_photographs(run, photos, tmp_path):
-    told = run("compare", photos, "--target", "chessboard:9x6:25mm", "--jobs", "2", "--folds", "2", "--json", "-o", tmp_path)
+    told = run(
+        "compare",
+        photos,
+        "--target",
+        "chessboard:9x6:25mm",
+        "--jobs",
+        "2",
+        "--folds",
+        "2",
+        "--json",
+        "-o",
+        tmp_path,
+    )
     assert told.code == 0, told.err
     numbers = json.loads(told.out)
     assert {entry["name"] for entry in numbers["compared"]} == set(USUAL)

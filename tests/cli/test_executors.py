@@ -1,4 +1,6 @@
-"""Work in threads, in processes and on a cluster gives what one alone gives, and nobody stays behind when it is stopped."""
+"""Work in threads, in processes and on a cluster gives what one alone gives, and nobody stays behind when it
+is stopped.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +17,8 @@ from operator import call
 import pytest
 
 from orthoscope.cli.executors import cluster, processes, threads
-from orthoscope.experiments.contenders import PAPER
-from orthoscope.experiments.trials import Condition, Study, trial_outcomes
+from orthoscope.paper.entries import PAPER
+from orthoscope.paper.trials import Condition, Study, trial_outcomes
 
 TARGET = "chessboard:9x6:25mm"
 LIMIT = 60.0  # seconds that a busy machine may take to start or to end a process
@@ -70,11 +72,19 @@ def test_sigterm_stops_a_block_as_ctrl_c_does_and_then_is_what_it_was():
 @pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL], ids=lambda how: how.name)
 def test_nobody_stays_behind_when_a_verb_is_stopped(tmp_path, how):
-    code = "from orthoscope.cli import main; import sys; sys.argv = ['orthoscope', 'paper', '--jobs', '2', '-o', 'out']; main()"
+    code = (
+        "from orthoscope.cli import main; import sys; sys.argv = ['orthoscope', 'paper', '--jobs', '2', '-o',"
+        " 'out']; main()"
+    )
     parent = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, stderr=subprocess.PIPE)
     try:
         known = psutil.Process(parent.pid)
-        wait_until(lambda: len(known.children()) >= 2 and sum(child.cpu_times().user for child in known.children()) > 1.0, "work")
+        wait_until(
+            lambda: (
+                len(known.children()) >= 2 and sum(child.cpu_times().user for child in known.children()) > 1.0
+            ),
+            "work",
+        )
         children = known.children(recursive=True)
         parent.send_signal(how)
         _, said = parent.communicate(timeout=LIMIT)
@@ -89,14 +99,18 @@ def test_nobody_stays_behind_when_a_verb_is_stopped(tmp_path, how):
 
 def test_a_cluster_that_is_not_there_is_named(run, tmp_path, monkeypatch):
     monkeypatch.setattr("orthoscope.cli.executors.PATIENCE", 0.5)
-    result = run("detect", tmp_path, "--target", TARGET, "--cluster", "tcp://127.0.0.1:9", "-o", tmp_path / "out.json")
+    result = run(
+        "detect", tmp_path, "--target", TARGET, "--cluster", "tcp://127.0.0.1:9", "-o", tmp_path / "out.json"
+    )
     assert result.code == 2
     assert "no Dask scheduler answers at 'tcp://127.0.0.1:9'" in result.err
 
 
 def test_without_dask_its_option_says_what_to_install(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    result = run("detect", tmp_path, "--target", TARGET, "--cluster", "tcp://127.0.0.1:9", "-o", tmp_path / "out.json")
+    result = run(
+        "detect", tmp_path, "--target", TARGET, "--cluster", "tcp://127.0.0.1:9", "-o", tmp_path / "out.json"
+    )
     assert result.code == 2
     assert "pip install 'orthoscope[cluster]'" in result.err
 
@@ -109,11 +123,30 @@ def dask(tmp_path_factory):
     one = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
     def start(module: str, *options: str) -> subprocess.Popen:
-        command = [sys.executable, "-m", f"distributed.cli.{module}", "--scheduler-file", str(known), "--no-dashboard", *options]
-        return subprocess.Popen(command, cwd=folder, env={**os.environ, **one}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        command = [
+            sys.executable,
+            "-m",
+            f"distributed.cli.{module}",
+            "--scheduler-file",
+            str(known),
+            "--no-dashboard",
+            *options,
+        ]
+        return subprocess.Popen(
+            command,
+            cwd=folder,
+            env={**os.environ, **one},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
 
     scheduler = start("dask_scheduler", "--host", "127.0.0.1", "--port", "0")
-    workers = [start("dask_worker", "--no-nanny", "--nthreads", "1", "--local-directory", str(folder), "--name", name) for name in "ab"]
+    workers = [
+        start(
+            "dask_worker", "--no-nanny", "--nthreads", "1", "--local-directory", str(folder), "--name", name
+        )
+        for name in "ab"
+    ]
     from distributed import Client
 
     try:
@@ -149,11 +182,16 @@ def test_verbs_give_the_same_files_on_a_cluster_as_here(run, dask, photos, calib
     for name, where in {"here": ("--jobs", 2), "there": ("--cluster", address)}.items():
         out = tmp_path / name
         assert run("detect", photos, "--target", TARGET, *where, "-o", out / "detections.json").code == 0
-        assert run("undistort", calibrated / "calibration.json", photos, *where, "-o", out / "straight").code == 0
+        assert (
+            run("undistort", calibrated / "calibration.json", photos, *where, "-o", out / "straight").code
+            == 0
+        )
         judged = run("evaluate", calibrated / "calibration.json", "--json", *where)
         assert judged.code == 0
         (out / "evaluation.json").write_text(judged.out)
-    here, there = (sorted(path for path in (tmp_path / name).rglob("*") if path.is_file()) for name in ("here", "there"))
+    here, there = (
+        sorted(path for path in (tmp_path / name).rglob("*") if path.is_file()) for name in ("here", "there")
+    )
     assert [path.name for path in here] == [path.name for path in there]
     assert len(here) == 13  # detections, evaluation, camera, ten pictures
     assert all(a.read_bytes() == b.read_bytes() for a, b in zip(here, there, strict=True))

@@ -1,24 +1,40 @@
-"""What the default method is told on the command line: which shape the target has, and for which tool the camera is meant."""
+"""What the default method is told on the command line: which shape the target has, and for which tool the
+camera is meant.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from orthoscope.evaluation.difference import image_difference
-from orthoscope.io.opencv_file import read_opencv
-from orthoscope.io.own_json import load_calibration
+from orthoscope.formats.opencv import read_opencv
+from orthoscope.formats.own.json import load_calibration
+from orthoscope.models.difference import image_difference
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
 
 
 @pytest.fixture
 def calibrate(run, calibrated, tmp_path):
-    """Runs `orthoscope calibrate` on the corners that were found before, into the folder that it gives back with what was told."""
+    """Runs `orthoscope calibrate` on the corners that were found before, into the folder that it gives back
+    with what was told.
+    """
 
     def runner(*arguments: str):
         out = tmp_path / "out"
-        return run("calibrate", calibrated / "detections.json", *arguments, "--folds", "2", "--no-report", "-o", out), out
+        return (
+            run(
+                "calibrate",
+                calibrated / "detections.json",
+                *arguments,
+                "--folds",
+                "2",
+                "--no-report",
+                "-o",
+                out,
+            ),
+            out,
+        )
 
     return runner
 
@@ -53,7 +69,9 @@ def test_for_a_tool_a_lens_that_it_has_is_chosen_and_written(calibrate):
     assert isinstance(made.camera.lens, Brown | Rational | KannalaBrandt)
     assert type(written.lens) is type(made.camera.lens)
     assert written.lens.coefficients.tobytes() == made.camera.lens.coefficients.tobytes()
-    assert {"brown", "kannala_brandt", "rational"} <= {candidate.lens.split()[0] for candidate in made.candidates}  # "from pairs"
+    assert {"brown", "kannala_brandt", "rational"} <= {
+        candidate.lens.split()[0] for candidate in made.candidates
+    }  # "from pairs"
     assert "camera-opencv.yaml" in told.out
 
 
@@ -62,7 +80,9 @@ def test_of_a_free_lens_the_nearest_formula_is_written_for_the_tool(calibrate):
     assert told.code == 0, told.err
     made, written = load_calibration(out / "calibration.json"), read_opencv(out / "camera-opencv.yaml")
     assert isinstance(made.camera.lens, FreeLens)
-    apart = image_difference(made.camera, written, np.concatenate([view.pixels for view in made.detections.views]))
+    apart = image_difference(
+        made.camera, written, np.concatenate([view.pixels for view in made.detections.views])
+    )
     assert np.hypot(*apart.T).mean() < 0.05  # the photographs were rendered with a brown lens
 
 

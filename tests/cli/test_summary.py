@@ -9,11 +9,13 @@ import pytest
 
 from orthoscope.cli.summary import evaluation_lines, evaluation_numbers
 from orthoscope.evaluation.evaluate import Evaluation, evaluate
-from orthoscope.evaluation.simulate import paper_scene, simulate_detections
-from orthoscope.geometry.target import Outlier
 from orthoscope.methods.fccm import fccm
+from orthoscope.simulation.scene import paper_scene, simulate_detections
+from orthoscope.targets.detections import Outlier
 
-OUTLIERS = tuple(Outlier(f"{i:02d}.jpg", corner, (1.0, 2.0), "9.0 px off") for i in range(8) for corner in range(i + 1))
+OUTLIERS = tuple(
+    Outlier(f"{i:02d}.jpg", corner, (1.0, 2.0), "9.0 px off") for i in range(8) for corner in range(i + 1)
+)
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +26,22 @@ def evaluation() -> Evaluation:
 
 def with_outliers(evaluation: Evaluation, outliers: tuple[Outlier, ...]) -> Evaluation:
     calibration = evaluation.calibration
-    return replace(evaluation, calibration=replace(calibration, detections=replace(calibration.detections, outliers=outliers)))
+    return replace(
+        evaluation,
+        calibration=replace(calibration, detections=replace(calibration.detections, outliers=outliers)),
+    )
 
 
 def test_corners_left_out_are_counted_and_their_photographs_named(evaluation: Evaluation):
     lines = evaluation_lines(with_outliers(evaluation, OUTLIERS))
-    told = "outliers   36 corners left out: 00.jpg (1), 01.jpg (2), 02.jpg (3), 03.jpg (4), 04.jpg (5), 05.jpg (6) and 2 more"
+    told = (
+        "outliers   36 corners left out: 00.jpg (1), 01.jpg (2), 02.jpg (3), 03.jpg (4), 04.jpg (5), 05.jpg"
+        " (6) and 2 more"
+    )
     assert told in lines
-    assert "outliers   1 corner left out: 00.jpg (1)" in evaluation_lines(with_outliers(evaluation, OUTLIERS[:1]))
+    assert "outliers   1 corner left out: 00.jpg (1)" in evaluation_lines(
+        with_outliers(evaluation, OUTLIERS[:1])
+    )
 
 
 def test_where_no_corner_is_left_out_nothing_is_said(evaluation: Evaluation):

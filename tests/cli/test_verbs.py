@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from orthoscope.cli import verbs
-from orthoscope.evaluation.difference import frame_grid, image_difference
-from orthoscope.io.images import read_image
-from orthoscope.io.own_json import load, load_camera, load_detections
+from orthoscope.files.images import read_image
+from orthoscope.formats.own.json import load, load_camera, load_detections
+from orthoscope.models.difference import frame_grid, image_difference
 
 TARGET = "chessboard:9x6:25mm"
 
@@ -26,14 +26,21 @@ def test_help_of_every_verb_shows_an_example(run, verb):
 
 def test_help_imports_nothing_heavy():
     heavy = ("numpy", "scipy", "cv2", "matplotlib", "msgspec", "jinja2", "tqdm")
-    code = "import sys; sys.argv = ['orthoscope', '--help']\nfrom orthoscope.cli import main\ntry: main()\nexcept SystemExit: pass\n"
+    code = (
+        "import sys; sys.argv = ['orthoscope', '--help']\nfrom orthoscope.cli import main\ntry:"
+        " main()\nexcept SystemExit: pass\n"
+    )
     code += f"sys.exit(', '.join(set({heavy}) & set(sys.modules)) or 0)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 
 def test_calibrate_writes_what_it_says_and_finds_the_camera(calibrated, scene):
-    assert {path.name for path in calibrated.iterdir()} == {"detections.json", "calibration.json", "report.html"}
+    assert {path.name for path in calibrated.iterdir()} == {
+        "detections.json",
+        "calibration.json",
+        "report.html",
+    }
     camera = load_camera(calibrated / "calibration.json")
     seen = np.concatenate([view.pixels for view in load_detections(calibrated / "detections.json").views])
     apart = np.hypot(*image_difference(scene.camera, camera, seen).T)
@@ -43,7 +50,16 @@ def test_calibrate_writes_what_it_says_and_finds_the_camera(calibrated, scene):
 def test_calibrate_prints_a_summary_of_a_few_lines(run, photos, tmp_path):
     told = run("calibrate", photos, "--target", TARGET, "--no-report", "-o", tmp_path)
     assert told.code == 0
-    for word in ("views      10 used, 0 set aside; 540 corners", "rms ", "held out", "NCE", "fx", "±", "verdict", "wrote"):
+    for word in (
+        "views      10 used, 0 set aside; 540 corners",
+        "rms ",
+        "held out",
+        "NCE",
+        "fx",
+        "±",
+        "verdict",
+        "wrote",
+    ):
         assert word in told.out
     assert len(told.out.splitlines()) < 14
 
@@ -56,13 +72,18 @@ def test_calibrate_json_is_one_object_with_the_promised_numbers(run, photos, tmp
     assert numbers["corners"] == 540
     assert 0 < numbers["rms_px"] < numbers["held_out_rms_px"] < 0.1
     assert numbers["nce"] < 0.3
-    assert numbers["camera"]["lens"]["name"] in ("brown", "free")  # the renderer's lens is brown, and a free one foresees it as well
+    assert numbers["camera"]["lens"]["name"] in (
+        "brown",
+        "free",
+    )  # the renderer's lens is brown, and a free one foresees it as well
 
 
 def test_the_same_command_twice_gives_the_same_bytes(run, photos, tmp_path):
     for folder in ("a", "b"):
         assert run("calibrate", photos, "--target", TARGET, "--undistort", "-o", tmp_path / folder).code == 0
-    first, second = (sorted(p for p in (tmp_path / folder).rglob("*") if p.is_file()) for folder in ("a", "b"))
+    first, second = (
+        sorted(p for p in (tmp_path / folder).rglob("*") if p.is_file()) for folder in ("a", "b")
+    )
     assert [p.relative_to(tmp_path / "a") for p in first] == [p.relative_to(tmp_path / "b") for p in second]
     assert all(a.read_bytes() == b.read_bytes() for a, b in zip(first, second, strict=True))
     assert len(first) == 3 + 10 + 1  # three files, ten straight pictures, their camera
@@ -70,7 +91,18 @@ def test_the_same_command_twice_gives_the_same_bytes(run, photos, tmp_path):
 
 def test_detect_then_calibrate_is_calibrate(run, photos, calibrated, tmp_path):
     assert run("detect", photos, "--target", TARGET, "-o", tmp_path / "detections.json").code == 0
-    assert run("calibrate", tmp_path / "detections.json", "--lens", "brown", "--no-report", "-o", tmp_path / "out").code == 0
+    assert (
+        run(
+            "calibrate",
+            tmp_path / "detections.json",
+            "--lens",
+            "brown",
+            "--no-report",
+            "-o",
+            tmp_path / "out",
+        ).code
+        == 0
+    )
     assert (tmp_path / "out/calibration.json").read_bytes() == (calibrated / "calibration.json").read_bytes()
 
 
@@ -98,17 +130,26 @@ def test_evaluate_judges_a_calibration_and_other_photographs(run, photos, calibr
     own = json.loads(run("evaluate", calibrated / "calibration.json", "--json").out)
     other = json.loads(run("evaluate", calibrated / "calibration.json", "--on", photos, "--json").out)
     assert own["held_out_rms_px"] > own["rms_px"]
-    assert other["rms_px"] == pytest.approx(own["rms_px"], rel=1e-3)  # the same photographs, poses fitted anew
+    assert other["rms_px"] == pytest.approx(
+        own["rms_px"], rel=1e-3
+    )  # the same photographs, poses fitted anew
     assert "verdict" in run("evaluate", calibrated / "calibration.json").out
 
 
 def test_report_writes_the_page_that_calibrate_writes(run, photos, calibrated, tmp_path):
-    assert run("report", calibrated / "calibration.json", "--photos", photos, "-o", tmp_path / "report.html").code == 0
+    assert (
+        run(
+            "report", calibrated / "calibration.json", "--photos", photos, "-o", tmp_path / "report.html"
+        ).code
+        == 0
+    )
     assert (tmp_path / "report.html").read_bytes() == (calibrated / "report.html").read_bytes()
 
 
 def test_undistort_makes_pictures_in_which_the_board_is_straight(run, photos, calibrated, tmp_path):
-    assert run("undistort", calibrated / "calibration.json", photos, "--keep", "valid", "-o", tmp_path).code == 0
+    assert (
+        run("undistort", calibrated / "calibration.json", photos, "--keep", "valid", "-o", tmp_path).code == 0
+    )
     assert len(list(tmp_path.glob("view*.png"))) == 10
     assert (read_image(tmp_path / "view01.png", grey=True) > 0).all()  # `valid`: no black border
     again = run("detect", tmp_path, "--target", TARGET, "--json", "-o", tmp_path / "again.json")
@@ -120,21 +161,49 @@ def test_undistort_makes_pictures_in_which_the_board_is_straight(run, photos, ca
 
 
 def test_export_writes_what_opencv_reads(run, calibrated, tmp_path):
-    assert run("export", calibrated / "calibration.json", "--to", "opencv", "-o", tmp_path / "camera.yaml").code == 0
+    assert (
+        run("export", calibrated / "calibration.json", "--to", "opencv", "-o", tmp_path / "camera.yaml").code
+        == 0
+    )
     assert "camera_matrix" in (tmp_path / "camera.yaml").read_text()
 
 
 def test_simulate_makes_detections_from_which_its_camera_is_found_again(run, tmp_path):
     assert run("simulate", "--noise", "0", "--views", "12", "-o", tmp_path).code == 0
-    told = run("calibrate", tmp_path / "detections.json", "--lens", "brown", "--json", "--no-report", "-o", tmp_path / "out")
+    told = run(
+        "calibrate",
+        tmp_path / "detections.json",
+        "--lens",
+        "brown",
+        "--json",
+        "--no-report",
+        "-o",
+        tmp_path / "out",
+    )
     assert json.loads(told.out)["rms_px"] < 1e-9
     truth, found = load_camera(tmp_path / "truth.json"), load_camera(tmp_path / "out/calibration.json")
-    assert np.abs(image_difference(truth, found, frame_grid(truth.image_size))).max() < 1e-6  # no noise: only rounding
+    assert (
+        np.abs(image_difference(truth, found, frame_grid(truth.image_size))).max() < 1e-6
+    )  # no noise: only rounding
 
 
 def test_simulate_takes_a_lens_a_size_and_views_of_the_users_choice(run, tmp_path):
     lens = ("--lens", "kannala_brandt:k1=-0.02", "--image-size", "800x600", "--focal", "300")
-    told = run("simulate", *lens, "--views", "9", "--fill", "0.3", "0.6", "--tilt-noise", "--partial", "--seed", "2", "-o", tmp_path)
+    told = run(
+        "simulate",
+        *lens,
+        "--views",
+        "9",
+        "--fill",
+        "0.3",
+        "0.6",
+        "--tilt-noise",
+        "--partial",
+        "--seed",
+        "2",
+        "-o",
+        tmp_path,
+    )
     assert told.code == 0, told.err
     truth, found = load(tmp_path / "truth.json"), load_detections(tmp_path / "detections.json")
     assert truth.camera.image_size == found.image_size == (800, 600)

@@ -9,30 +9,34 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from boards import BOARD, NARROW, bent, perfect, photographs_of
 from numpy.testing import assert_allclose, assert_array_equal
 
+from helpers.boards import BOARD, NARROW, bent, perfect, photographs_of
+from helpers.real_sets import classic
 from orthoscope.evaluation.coverage import corners_by_cell
 from orthoscope.evaluation.evaluate import Evaluation, evaluate, evaluate_on
-from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
+from orthoscope.fitting.calibration import rms
+from orthoscope.fitting.held_out import held_out
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.geometry.target import Detections, View
-from orthoscope.methods.calibration import rms
 from orthoscope.methods.fccm import fccm
-from orthoscope.methods.held_out import held_out
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
-from real_sets import classic
+from orthoscope.simulation.scene import Scene, random_views, simulate_detections
+from orthoscope.targets.detections import Detections, View
 
 CAMERA = Camera((640, 480), Intrinsics(520.0, 524.0, 325.0, 236.0), Brown(k1=-0.28, k2=0.09, p1=1e-3))
 NOISE = 0.2  # px per coordinate
 
 
-def photographed(views: int, *, camera: Camera = CAMERA, noise_px: float = NOISE, seed: int = 0, **how) -> Detections:
+def photographed(
+    views: int, *, camera: Camera = CAMERA, noise_px: float = NOISE, seed: int = 0, **how
+) -> Detections:
     rng = np.random.default_rng(seed)
-    return simulate_detections(Scene(camera, BOARD, random_views(camera, BOARD, views, rng=rng, **how)), noise_px=noise_px, rng=rng)
+    return simulate_detections(
+        Scene(camera, BOARD, random_views(camera, BOARD, views, rng=rng, **how)), noise_px=noise_px, rng=rng
+    )
 
 
 @pytest.fixture(scope="module")
@@ -50,17 +54,22 @@ def test_a_good_set_gets_its_error_with_its_uncertainty_and_no_warning(good):
     )
     assert told
     assert tuple(map(float, told.groups())) == tuple(
-        float(f"{value:.2f}") for value in (good.held_out_rms_px, good.held_out_error_px, good.rms_px, 100 * good.coverage)
+        float(f"{value:.2f}")
+        for value in (good.held_out_rms_px, good.held_out_error_px, good.rms_px, 100 * good.coverage)
     )
 
 
 def test_its_numbers_are_those_of_the_noise(good):
     n, unknowns = 2 * good.calibration.detections.corners, 9 + 6 * 15
-    assert_allclose(good.rms_px, NOISE * np.sqrt(2.0 * (1.0 - unknowns / n)), rtol=0.06)  # 810 corners tell it to 1.8 %: three of these
+    assert_allclose(
+        good.rms_px, NOISE * np.sqrt(2.0 * (1.0 - unknowns / n)), rtol=0.06
+    )  # 810 corners tell it to 1.8 %: three of these
     assert good.rms_px < good.held_out_rms_px < 1.1 * good.rms_px
     assert_allclose(good.median_px, NOISE * np.sqrt(2.0 * np.log(2.0)), rtol=0.1)  # Rayleigh's median
     assert 3.0 * NOISE < good.largest_px < 5.0 * NOISE
-    assert_allclose(good.nce, NOISE * np.sqrt(np.pi / 2.0) / np.sqrt(1.0 / 6.0), rtol=0.1)  # Rayleigh's mean over 0.408 px
+    assert_allclose(
+        good.nce, NOISE * np.sqrt(np.pi / 2.0) / np.sqrt(1.0 / 6.0), rtol=0.1
+    )  # Rayleigh's mean over 0.408 px
 
 
 def test_views_are_told_one_by_one_and_add_up(good):
@@ -74,7 +83,11 @@ def test_views_are_told_one_by_one_and_add_up(good):
 
 def test_what_is_held_out_is_held_out_by_the_calibrations_own_method_and_settings():
     calibration = fccm(photographed(8), lens="brown:k1", loss="huber", loss_scale=0.5)
-    expected = held_out(calibration.detections, lambda some: fccm(some, lens="brown:k1", loss="huber", loss_scale=0.5), folds=4)
+    expected = held_out(
+        calibration.detections,
+        lambda some: fccm(some, lens="brown:k1", loss="huber", loss_scale=0.5),
+        folds=4,
+    )
     with ThreadPoolExecutor(2) as executor:
         evaluation = evaluate(calibration, folds=4, executor=executor)
     assert_array_equal(np.array(evaluation.held_out_residuals), np.array(expected.residuals))
@@ -85,7 +98,8 @@ def test_a_lens_that_folds_over_inside_the_data_is_not_to_be_trusted():
     evaluation = evaluate(fccm(photographed(12, camera=wide), lens="brown:k1"), folds=2)
     assert evaluation.verdict.startswith("Do not trust this lens formula: it folds over inside the data")
     assert any(
-        re.search(r"folds over at 5\d\.\d degrees from the axis, before \d+ of 648 corners", warning) for warning in evaluation.warnings
+        re.search(r"folds over at 5\d\.\d degrees from the axis, before \d+ of 648 corners", warning)
+        for warning in evaluation.warnings
     )
 
 
@@ -120,7 +134,9 @@ def test_assumptions_stand_among_the_warnings():
 
 def test_one_view_is_not_called_views():
     camera = Camera((640, 480), Intrinsics(520.0, 520.0, 319.5, 239.5), Brown(k1=-0.2))
-    evaluation = evaluate(fccm(photographed(1, camera=camera, tilt=(0.4, 0.7), fill=(0.7, 0.9)), lens="brown:k1"))
+    evaluation = evaluate(
+        fccm(photographed(1, camera=camera, tilt=(0.4, 0.7), fill=(0.7, 0.9)), lens="brown:k1")
+    )
     assert any(warning.startswith("only 1 view;") for warning in evaluation.warnings)
 
 
@@ -133,7 +149,10 @@ def test_a_solver_that_did_not_converge_is_told_of():
 def test_a_view_whose_corners_were_badly_found_is_named_and_no_other(odd):
     detections = photographed(12)
     views = list(detections.views)
-    views[odd] = replace(views[odd], pixels=views[odd].pixels + np.random.default_rng(odd).normal(scale=3.0, size=views[odd].pixels.shape))
+    views[odd] = replace(
+        views[odd],
+        pixels=views[odd].pixels + np.random.default_rng(odd).normal(scale=3.0, size=views[odd].pixels.shape),
+    )
     evaluation = evaluate(fccm(replace(detections, views=tuple(views))))
     (suspect,) = evaluation.suspects
     assert suspect[0] == views[odd].image
@@ -171,16 +190,23 @@ def test_the_place_that_no_photograph_covers_is_named(empty):
 
 def test_a_verdict_over_a_part_of_the_frame_says_so():
     evaluation = evaluate(fccm(small_boards_but_for((0, 0)), lens="brown:k1"))
-    assert re.search(rf", where corners were seen: {100 * evaluation.coverage:.0f} % of the frame\.$", evaluation.verdict)
+    assert re.search(
+        rf", where corners were seen: {100 * evaluation.coverage:.0f} % of the frame\.$", evaluation.verdict
+    )
 
 
-# --- targets and lenses that are not what they are said to be --------------------------------------------------------
+# --- targets and lenses that are not what they are said to be
+# --------------------------------------------------------
 
 
 def test_a_bent_board_is_told_of_in_px_and_mm_with_what_to_do():
     evaluation = evaluate(fccm(photographs_of(bent(2.0), 15, 0), lens="brown"))
     warning = evaluation.warnings[0]
-    told = re.search(r"off their places by the same (0\.\d+) px, (0\.\d+) mm on the target .* image is off by (\d\.\d) px or more", warning)
+    told = re.search(
+        r"off their places by the same (0\.\d+) px, (0\.\d+) mm on the target .* image is off by (\d\.\d) px"
+        r" or more",
+        warning,
+    )
     assert told
     target = evaluation.misfit.target
     assert_allclose(float(told[1]), target.test.systematic_px, rtol=0.05)  # told to two digits
@@ -202,7 +228,8 @@ def test_a_lens_formula_that_cannot_follow_is_told_of_with_others_to_try():
     evaluation = evaluate(fccm(perfect(NARROW, 20, 1)[1], lens="division"))
     (warning,) = evaluation.warnings
     assert warning.startswith(
-        "the formula division cannot follow this lens: at the same places of the image corners are off by the same 0."
+        "the formula division cannot follow this lens: at the same places of the image corners are off by the"
+        " same 0."
     )
     assert warning.endswith("Try another: --lens brown, rational or kannala_brandt")
     assert "; the formula division limits it: 0." in evaluation.verdict
@@ -211,10 +238,14 @@ def test_a_lens_formula_that_cannot_follow_is_told_of_with_others_to_try():
 @pytest.mark.datasets
 def test_calibrel_looks_perfect_by_every_usual_check_and_is_not_to_be_trusted(datasets: Path):
     evaluation = evaluate(fccm(classic(datasets, "calibrel"), lens="brown"))
-    assert evaluation.held_out_rms_px < 1.02 * evaluation.rms_px  # photographs that were not used are no worse
+    assert (
+        evaluation.held_out_rms_px < 1.02 * evaluation.rms_px
+    )  # photographs that were not used are no worse
     assert evaluation.suspects == ()
     assert evaluation.coverage == 1.0
-    assert evaluation.calibration.uncertainty.deviations["cx"] < 3.0  # px, though it is about 70 px from where the target's shape puts it
+    assert (
+        evaluation.calibration.uncertainty.deviations["cx"] < 3.0
+    )  # px, though it is about 70 px from where the target's shape puts it
     (warning,) = evaluation.warnings
     assert warning.startswith("the target is not flat, or not as it is described: in view after view")
     assert evaluation.misfit.target.moves_camera_px > 3.0 * evaluation.held_out_rms_px
@@ -222,14 +253,17 @@ def test_calibrel_looks_perfect_by_every_usual_check_and_is_not_to_be_trusted(da
     assert evaluation.verdict.endswith("Estimate its shape: --method decoupled.")
 
 
-# --- other photographs -----------------------------------------------------------------------------------------------
+# --- other photographs
+# -----------------------------------------------------------------------------------------------
 
 
 def test_a_camera_is_judged_on_other_photographs_by_their_poses_alone():
     camera, fresh = fccm(photographed(12)).camera, photographed(6, seed=1)
     unseen = evaluate_on(camera, fresh)
     assert unseen.detections.views == fresh.views
-    assert_allclose(unseen.rms_px, NOISE * np.sqrt(2.0 * (1.0 - 6.0 / 108.0)), rtol=0.12)  # 324 corners tell it to 3 %
+    assert_allclose(
+        unseen.rms_px, NOISE * np.sqrt(2.0 * (1.0 - 6.0 / 108.0)), rtol=0.12
+    )  # 324 corners tell it to 3 %
     assert len(unseen.view_rms_px) == 6
     assert_allclose(np.mean(np.square(unseen.view_rms_px)), unseen.rms_px**2)
     assert unseen.nce > 0
@@ -237,7 +271,9 @@ def test_a_camera_is_judged_on_other_photographs_by_their_poses_alone():
 
 def test_photographs_of_another_size_are_refused():
     other = replace(photographed(3), image_size=(1280, 960))
-    with pytest.raises(InputError, match="these photographs are 1280x960; the camera was calibrated at 640x480"):
+    with pytest.raises(
+        InputError, match="these photographs are 1280x960; the camera was calibrated at 640x480"
+    ):
         evaluate_on(CAMERA, other)
 
 

@@ -10,9 +10,9 @@ from orthoscope.evaluation.coverage import COVERAGE_GRID, corners_by_cell
 from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.geometry.target import Detections, View, chessboard
 from orthoscope.models.camera import WIDEST, Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.targets.detections import Detections, View, chessboard
 
 PINHOLE = Camera((640, 480), Intrinsics(500.0, 500.0, 320.0, 240.0), Brown())
 BOARD = chessboard(9, 6, 0.025)
@@ -31,21 +31,27 @@ def back_projected(camera: Camera, pixels: np.ndarray, depth: np.ndarray) -> np.
 
 
 def test_rounding_to_whole_pixels_alone_gives_0_94():
-    # rounding is uniform over a square of one pixel; the mean distance from a square's middle is (sqrt 2 + asinh 1) / 6 = 0.3826 px,
-    # and NCE divides by the root mean square, sqrt(1/12 + 1/12) = 0.4082 px
+    # rounding is uniform over a square of one pixel; the mean distance from a square's middle is (sqrt 2 +
+    # asinh 1) / 6 = 0.3826 px, and NCE divides by the root mean square, sqrt(1/12 + 1/12) = 0.4082 px
     expected = (np.sqrt(2.0) + np.arcsinh(1.0)) / 6.0 / np.sqrt(1.0 / 6.0)
     points = points_in_front(40_000)
     rounded = np.round(PINHOLE.project(points))
-    nce = normalised_calibration_error(back_projected(PINHOLE, rounded, points[:, 2]), points, PINHOLE.intrinsics)
+    nce = normalised_calibration_error(
+        back_projected(PINHOLE, rounded, points[:, 2]), points, PINHOLE.intrinsics
+    )
     assert_allclose(expected, 0.9372, atol=5e-5)
-    assert_allclose(nce, expected, rtol=0.006)  # the distance varies by 37 %: three deviations of a mean of 40 000
+    assert_allclose(
+        nce, expected, rtol=0.006
+    )  # the distance varies by 37 %: three deviations of a mean of 40 000
 
 
 @pytest.mark.parametrize("offset", [(0.4082, 0.0), (0.0, -0.4082), (0.3, 0.277)])
 def test_one_is_0_41_px(offset):
     points = points_in_front(50)
     seen = PINHOLE.project(points) + offset
-    nce = normalised_calibration_error(back_projected(PINHOLE, seen, points[:, 2]), points, PINHOLE.intrinsics)
+    nce = normalised_calibration_error(
+        back_projected(PINHOLE, seen, points[:, 2]), points, PINHOLE.intrinsics
+    )
     assert_allclose(nce, 1.0, rtol=1e-3)
 
 
@@ -53,7 +59,10 @@ def test_an_error_along_the_finer_side_of_a_pixel_counts_by_its_size_in_space():
     K = Intrinsics(1000.0, 500.0, 320.0, 240.0)
     camera, points = Camera((640, 480), K, Brown()), np.array([[0.1, 0.05, 1.0]])
     along_x, along_y = (
-        normalised_calibration_error(back_projected(camera, camera.project(points) + e, points[:, 2]), points, K) for e in ((1, 0), (0, 1))
+        normalised_calibration_error(
+            back_projected(camera, camera.project(points) + e, points[:, 2]), points, K
+        )
+        for e in ((1, 0), (0, 1))
     )
     assert_allclose(along_y / along_x, 2.0)
     assert_allclose(along_x, 1e-3 / np.sqrt((1e-6 + 4e-6) / 12.0))
@@ -66,7 +75,11 @@ def test_depth_does_not_matter():
     for factor in (1.0, 7.0, np.random.default_rng(2).uniform(0.1, 50.0, (200, 1))):
         moved = factor * points
         seen = PINHOLE.project(moved) + error
-        nces.append(normalised_calibration_error(back_projected(PINHOLE, seen, moved[:, 2]), moved, PINHOLE.intrinsics))
+        nces.append(
+            normalised_calibration_error(
+                back_projected(PINHOLE, seen, moved[:, 2]), moved, PINHOLE.intrinsics
+            )
+        )
     assert_allclose(nces, nces[0], rtol=1e-9)
 
 
@@ -92,12 +105,24 @@ def test_corners_that_no_straight_image_would_hold_are_left_out():
     pixels = camera.project(turned.apply(BOARD.points))
     angles = np.arccos(camera.unproject(pixels)[:, 2])
     assert angles.min() < WIDEST < angles.max()
-    estimated, observed = lateral_errors(camera, [turned], Detections(BOARD, (640, 480), (View("a", np.arange(54), pixels),)))
+    estimated, observed = lateral_errors(
+        camera, [turned], Detections(BOARD, (640, 480), (View("a", np.arange(54), pixels),))
+    )
     assert len(estimated) == len(observed) == (angles < WIDEST).sum()
 
 
 def test_cells_share_the_frame_and_its_border_belongs_to_it():
-    corners = np.array([[-0.5, -0.5], [0.0, 0.0], [639.5, -0.5], [639.5, 479.5], [320.0, 240.0], [640.0, 100.0], [-0.6, 100.0]])
+    corners = np.array(
+        [
+            [-0.5, -0.5],
+            [0.0, 0.0],
+            [639.5, -0.5],
+            [639.5, 479.5],
+            [320.0, 240.0],
+            [640.0, 100.0],
+            [-0.6, 100.0],
+        ]
+    )
     target = chessboard(4, 2, 0.1)
     counts = corners_by_cell(Detections(target, (640, 480), (View("a", np.arange(7), corners),)))
     assert counts.shape == COVERAGE_GRID[::-1]

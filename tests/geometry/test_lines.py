@@ -20,7 +20,9 @@ def test_the_cross_ratio_survives_every_homography():
     for _ in range(20):
         h = np.eye(3) + 0.1 * rng.standard_normal((3, 3))
         seen = np.concatenate([FOUR, np.ones((1, 4, 1))], axis=2) @ h.T
-        assert_allclose(cross_ratio(seen[..., :2] / seen[..., 2:]), 4.0 / 3.0, rtol=1e-12)  # a few roundings, points a unit apart
+        assert_allclose(
+            cross_ratio(seen[..., :2] / seen[..., 2:]), 4.0 / 3.0, rtol=1e-12
+        )  # a few roundings, points a unit apart
 
 
 def test_the_slope_of_the_cross_ratio_is_its_derivative_off_the_line_too():

@@ -7,7 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from orthoscope.geometry.arrays import InputError
-from orthoscope.geometry.pose import Pose, cross_matrix, nearest_rotation, rotation_from_vector, vector_from_rotation
+from orthoscope.geometry.pose import (
+    Pose,
+    cross_matrix,
+    nearest_rotation,
+    rotation_from_vector,
+    vector_from_rotation,
+)
 
 EXACT = 1e-14  # a few roundings of numbers of size 1
 POINTS = np.array([[0.1, -0.2, 0.3], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
@@ -21,7 +27,9 @@ VECTORS = {
     "nearly half a turn": [0.0, np.pi - 1e-9, 0.0],
     "half a turn about a slanted axis": (np.pi * np.array([2.0, -1.0, 2.0]) / 3.0).tolist(),
 }
-FOR_EVERY_VECTOR = pytest.mark.parametrize("vector", [np.array(v) for v in VECTORS.values()], ids=VECTORS.keys())
+FOR_EVERY_VECTOR = pytest.mark.parametrize(
+    "vector", [np.array(v) for v in VECTORS.values()], ids=VECTORS.keys()
+)
 
 
 def some_pose(seed: int) -> Pose:
@@ -51,17 +59,23 @@ def test_the_vector_of_a_rotation_gives_the_rotation_back(vector):
 
 @pytest.mark.parametrize("name", [name for name in VECTORS if name != "half a turn about a slanted axis"])
 def test_below_half_a_turn_the_vector_itself_comes_back(name):
-    assert_allclose(vector_from_rotation(rotation_from_vector(np.array(VECTORS[name]))), VECTORS[name], atol=1e-13)
+    assert_allclose(
+        vector_from_rotation(rotation_from_vector(np.array(VECTORS[name]))), VECTORS[name], atol=1e-13
+    )
 
 
 def test_half_a_turn_comes_back_about_its_axis():
     vector = np.array(VECTORS["half a turn about a slanted axis"])
     again = vector_from_rotation(rotation_from_vector(vector))
-    assert_allclose(np.abs(again @ vector), np.pi**2, rtol=1e-12)  # either sense of the axis is the same half turn
+    assert_allclose(
+        np.abs(again @ vector), np.pi**2, rtol=1e-12
+    )  # either sense of the axis is the same half turn
 
 
 def test_a_right_angle_about_z_takes_x_to_y():
-    assert_allclose(rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])) @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=EXACT)
+    assert_allclose(
+        rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])) @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=EXACT
+    )
 
 
 def test_rotation_vectors_come_in_stacks():
@@ -73,8 +87,12 @@ def test_a_step_on_the_left_has_the_stated_derivative():
     pose, step = some_pose(1), 1e-6
     rotated = pose.rotation @ POINTS[0]
     for axis in np.eye(3):
-        difference = rotation_from_vector(step * axis) @ rotated - rotation_from_vector(-step * axis) @ rotated
-        assert_allclose(difference / (2.0 * step), -cross_matrix(rotated) @ axis, atol=1e-9)  # rounding over step
+        difference = (
+            rotation_from_vector(step * axis) @ rotated - rotation_from_vector(-step * axis) @ rotated
+        )
+        assert_allclose(
+            difference / (2.0 * step), -cross_matrix(rotated) @ axis, atol=1e-9
+        )  # rounding over step
 
 
 def test_the_cross_matrix_is_the_cross_product():
@@ -92,7 +110,9 @@ def test_a_pose_and_its_inverse_cancel():
 def test_composing_poses_is_applying_them_in_turn():
     camera_from_world, world_from_target = some_pose(3), some_pose(4)
     camera_from_target = camera_from_world @ world_from_target
-    assert_allclose(camera_from_target.apply(POINTS), camera_from_world.apply(world_from_target.apply(POINTS)), atol=EXACT)
+    assert_allclose(
+        camera_from_target.apply(POINTS), camera_from_world.apply(world_from_target.apply(POINTS)), atol=EXACT
+    )
 
 
 def test_composition_is_associative():
@@ -116,7 +136,9 @@ def test_a_scaled_rotation_is_taken_back_to_it():
     assert_allclose(nearest_rotation(1.7 * rotation), rotation, atol=EXACT)
 
 
-@pytest.mark.parametrize("wrong", [np.diag([1.0, 1.0, -1.0]), 1.01 * np.eye(3), np.zeros((3, 3))], ids=["mirror", "scaled", "zero"])
+@pytest.mark.parametrize(
+    "wrong", [np.diag([1.0, 1.0, -1.0]), 1.01 * np.eye(3), np.zeros((3, 3))], ids=["mirror", "scaled", "zero"]
+)
 def test_what_is_no_rotation_is_refused(wrong):
     with pytest.raises(InputError, match="not orthonormal"):
         Pose(wrong, np.zeros(3))

@@ -8,11 +8,13 @@ from numpy.testing import assert_allclose
 
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.geometry.projective import homographies_to_pixels, homographies_to_rays
-from orthoscope.geometry.target import chessboard
+from orthoscope.targets.detections import chessboard
 
 BOARD = chessboard(9, 6, 0.025).points[:, :2]
 K = np.array([[700.0, 0.5, 320.0], [0.0, 710.0, 240.0], [0.0, 0.0, 1.0]])
-PIXEL = 1e-8  # px: the normal matrix squares the condition, some 1e3 of a normalised board, of 1e-16 times 1e3 px
+PIXEL = (
+    1e-8  # px: the normal matrix squares the condition, some 1e3 of a normalised board, of 1e-16 times 1e3 px
+)
 
 
 def plane_to_camera(vector: list[float], translation: list[float]) -> np.ndarray:
@@ -69,7 +71,9 @@ def test_weight_zero_is_no_corner(corners):
     weights[:, seen] = 1.0
     spoilt = np.where(weights[..., None] > 0, pixels, 1e5)
     found = homographies_to_pixels(points, spoilt, weights)
-    assert_allclose(pixels_of(found, BOARD), pixels, atol=1e-6)  # from few corners to the others: extrapolated 3 boards wide
+    assert_allclose(
+        pixels_of(found, BOARD), pixels, atol=1e-6
+    )  # from few corners to the others: extrapolated 3 boards wide
 
 
 def test_views_may_have_different_corners():
@@ -96,7 +100,9 @@ def test_a_weight_of_two_is_the_corner_twice():
 def test_rays_of_any_length_are_met_exactly():
     seen = seen_from(POSES) * np.linspace(0.3, 5.0, 54)[None, :, None]
     found = homographies_to_rays(np.repeat(BOARD[None], 3, axis=0), seen, np.ones((3, 54)))
-    assert_allclose(np.cross(homogeneous(BOARD) @ np.swapaxes(found, 1, 2), seen_from(POSES)), 0.0, atol=1e-10)
+    assert_allclose(
+        np.cross(homogeneous(BOARD) @ np.swapaxes(found, 1, 2), seen_from(POSES)), 0.0, atol=1e-10
+    )
 
 
 def test_rays_past_90_degrees_are_met_and_point_forward():
@@ -107,7 +113,11 @@ def test_rays_past_90_degrees_are_met_and_point_forward():
     assert (seen[..., 2] > 0).any()
     found = homographies_to_rays(BOARD[None], seen, np.ones((1, 54)))
     met = homogeneous(BOARD) @ np.swapaxes(found, 1, 2)
-    assert_allclose(met / np.linalg.norm(met, axis=-1, keepdims=True), seen / np.linalg.norm(seen, axis=-1, keepdims=True), atol=1e-9)
+    assert_allclose(
+        met / np.linalg.norm(met, axis=-1, keepdims=True),
+        seen / np.linalg.norm(seen, axis=-1, keepdims=True),
+        atol=1e-9,
+    )
 
 
 def test_moving_the_origin_of_the_pixels_moves_the_homography_with_it():

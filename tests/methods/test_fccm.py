@@ -1,4 +1,6 @@
-"""FCCM: without noise it finds the image of every lens; with little to go on it says what it assumes, or that it cannot know."""
+"""FCCM: without noise it finds the image of every lens; with little to go on it says what it assumes, or that
+it cannot know.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +10,49 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import BOARD, NARROW, WIDE, K, camera_with, facing, image_difference, photographed, seen, some_corners, worst_image
 
-from laws import LENSES_TO_TRY
-from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
+from helpers.laws import LENSES_TO_TRY
+from helpers.scenes import (
+    BOARD,
+    NARROW,
+    WIDE,
+    K,
+    camera_with,
+    facing,
+    image_difference,
+    photographed,
+    seen,
+    some_corners,
+    worst_image,
+)
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.geometry.target import Detections, View, chessboard
 from orthoscope.methods.fccm import fccm
-from orthoscope.methods.observations import Observations
-from orthoscope.methods.reprojection import Estimate, Reprojection
 from orthoscope.models.camera import Intrinsics
 from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import LENSES, Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational, lens_name
+from orthoscope.models.lenses import (
+    LENSES,
+    Brown,
+    Division,
+    Fet,
+    Fov,
+    KannalaBrandt,
+    Pfet,
+    Rational,
+    lens_name,
+)
+from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import solve
 from orthoscope.solve.losses import Linear
+from orthoscope.targets.detections import Detections, View, chessboard
 
 FINE = chessboard(14, 10, 0.016)
 DENSE = simulate_detections(
-    Scene(NARROW, FINE, random_views(NARROW, FINE, 8, rng=np.random.default_rng(0))), noise_px=0.1, rng=np.random.default_rng(0)
+    Scene(NARROW, FINE, random_views(NARROW, FINE, 8, rng=np.random.default_rng(0))),
+    noise_px=0.1,
+    rng=np.random.default_rng(0),
 )
 EXACT = 1e-6  # px: what the issue asks for; the solver stops where 1e-18 px^2 are to be gained
 
@@ -38,8 +64,14 @@ NOT_RECOVERED = {
 
 
 def described(lens: Lens) -> str:
-    """The lens's name with the coefficients to free: the usual ones and those that this lens has beyond them (but for its scale)."""
-    used = [name for name in lens.names() if getattr(lens, name) != getattr(type(lens)(), name) and name not in ("a1", "scale")]
+    """The lens's name with the coefficients to free: the usual ones and those that this lens has beyond them
+    (but for its scale).
+    """
+    used = [
+        name
+        for name in lens.names()
+        if getattr(lens, name) != getattr(type(lens)(), name) and name not in ("a1", "scale")
+    ]
     return f"{lens_name(lens)}:{','.join(dict.fromkeys([*lens.free, *used]))}"
 
 
@@ -98,7 +130,11 @@ def test_skew_comes_back_where_it_is_asked_for():
 
 
 @pytest.mark.parametrize("named", ["brown:k1", "pfet:a3", "kannala_brandt:k1", "rational:k1,k4"])
-@pytest.mark.parametrize("camera", [NARROW, replace(WIDE, intrinsics=Intrinsics(300.0, 300.0, 318.0, 242.0))], ids=["narrow", "wide"])
+@pytest.mark.parametrize(
+    "camera",
+    [NARROW, replace(WIDE, intrinsics=Intrinsics(300.0, 300.0, 318.0, 242.0))],
+    ids=["narrow", "wide"],
+)
 def test_coefficients_that_are_not_named_keep_their_usual_values(named, camera):
     lens = fccm(photographed(camera, 8, noise_px=0.1), lens=named).camera.lens
     name, _, free = named.partition(":")
@@ -108,8 +144,15 @@ def test_coefficients_that_are_not_named_keep_their_usual_values(named, camera):
 
 
 def test_coefficients_that_only_together_make_the_image_are_named_and_the_camera_is_known_all_the_same():
-    found = fccm(photographed(camera_with(Rational()), 8), lens="rational")  # no distortion: any fraction with equal halves will do
-    assert found.assumptions == ("k1, k2, k3, k4, k5, k6: the views do not tell them apart; other values together make the same images",)
+    found = fccm(
+        photographed(camera_with(Rational()), 8), lens="rational"
+    )  # no distortion: any fraction with equal halves will do
+    assert found.assumptions == (
+        (
+            "k1, k2, k3, k4, k5, k6: the views do not tell them apart; other values together make the same"
+            " images"
+        ),
+    )
     assert found.uncertainty.names == ("fx", "fy", "cx", "cy", "p1", "p2")
     assert np.isfinite(found.uncertainty.covariance).all()
 
@@ -119,7 +162,8 @@ def test_a_start_on_a_sample_of_the_corners_ends_where_one_on_all_of_them_does(l
     sampled = fccm(DENSE, lens=lens)
     monkeypatch.setattr(sys.modules[fccm.__module__], "SAMPLE", DENSE.corners)
     everything = fccm(DENSE, lens=lens)
-    # 1e-10 of the cost of 2240 numbers is 5e-4 of a standard deviation, which is below 0.1 px in the image here; and that twice
+    # 1e-10 of the cost of 2240 numbers is 5e-4 of a standard deviation, which is below 0.1 px in the image
+    # here; and that twice
     assert worst_image(sampled.camera, everything.camera, DENSE) < 1e-4
 
 
@@ -130,7 +174,9 @@ def test_started_again_where_it_ended_nothing_is_left_to_gain(lens):
     again = Reprojection(observations, DENSE.target.points, found.camera, free)
     there = Estimate(found.camera, observations.poses_of(found.camera_from_target))
     cost = again.linearise(there, Linear()).cost
-    assert solve(again, there).cost > cost * (1.0 - 1e-8)  # a hundred times the tolerance: where a valley is flat, what is left adds up
+    assert solve(again, there).cost > cost * (
+        1.0 - 1e-8
+    )  # a hundred times the tolerance: where a valley is flat, what is left adds up
 
 
 def test_the_answer_is_the_same_to_the_byte_every_time():
@@ -141,7 +187,10 @@ def test_the_answer_is_the_same_to_the_byte_every_time():
         assert one.camera.lens.coefficients.tobytes() == other.camera.lens.coefficients.tobytes()
         assert one.uncertainty.covariance.tobytes() == other.uncertainty.covariance.tobytes()
         for a, b in zip(one.camera_from_target, other.camera_from_target, strict=True):
-            assert (a.rotation.tobytes(), a.translation.tobytes()) == (b.rotation.tobytes(), b.translation.tobytes())
+            assert (a.rotation.tobytes(), a.translation.tobytes()) == (
+                b.rotation.tobytes(),
+                b.translation.tobytes(),
+            )
 
 
 def test_its_settings_and_detections_make_it_again():
@@ -157,34 +206,50 @@ def test_a_robust_loss_finds_the_camera_behind_gross_errors(outliers):
 
     def spoilt(view: View) -> View:
         wrong = rng.random(len(view.ids)) < outliers
-        return View(view.image, view.ids, view.pixels + wrong[:, None] * rng.normal(scale=20.0, size=view.pixels.shape))
+        return View(
+            view.image,
+            view.ids,
+            view.pixels + wrong[:, None] * rng.normal(scale=20.0, size=view.pixels.shape),
+        )
 
     bad = replace(detections, views=tuple(spoilt(view) for view in detections.views))
     pixels = np.concatenate([view.pixels for view in detections.views])
     fits = (fccm(detections), fccm(bad, loss="cauchy", loss_scale=0.3), fccm(bad))
-    clean, robust, plain = (np.sqrt((image_difference(NARROW, fit.camera, pixels) ** 2).mean()) for fit in fits)
+    clean, robust, plain = (
+        np.sqrt((image_difference(NARROW, fit.camera, pixels) ** 2).mean()) for fit in fits
+    )
     assert robust < 2.0 * clean
     assert plain > 10.0 * clean
 
 
-# --- few views -------------------------------------------------------------------------------------------------------
+# --- few views
+# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("lens", ["brown:k1", "kannala_brandt:k1", "fov", "division"])
 @pytest.mark.parametrize("seed", range(4))
 def test_one_view_is_enough_for_a_camera_that_is_as_assumed_and_the_assumptions_are_said(lens, seed):
-    kinds = {"brown:k1": Brown(k1=-0.2), "kannala_brandt:k1": KannalaBrandt(k1=-0.05), "fov": Fov(w=0.8), "division": Division(l=-0.2)}
+    kinds = {
+        "brown:k1": Brown(k1=-0.2),
+        "kannala_brandt:k1": KannalaBrandt(k1=-0.05),
+        "fov": Fov(w=0.8),
+        "division": Division(l=-0.2),
+    }
     camera = camera_with(kinds[lens], Intrinsics(520.0, 520.0, 319.5, 239.5))
     detections = photographed(camera, 1, tilt=(0.4, 0.7), fill=(0.7, 0.9), seed=seed)
     found = fccm(detections, lens=lens)
-    assert found.assumptions == ("one view: the principal point is taken at the image's centre, fx = fy and skew = 0",)
+    assert found.assumptions == (
+        "one view: the principal point is taken at the image's centre, fx = fy and skew = 0",
+    )
     assert found.uncertainty.names[0] == "fx=fy"
     assert worst_image(camera, found.camera, detections) < EXACT
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_what_one_view_assumes_holds_to_the_bit_in_its_answer(seed):
-    camera = camera_with(Brown(k1=-0.2), Intrinsics(520.0, 530.0, 330.0, 230.0))  # not as assumed, so the start may take any road
+    camera = camera_with(
+        Brown(k1=-0.2), Intrinsics(520.0, 530.0, 330.0, 230.0)
+    )  # not as assumed, so the start may take any road
     detections = photographed(camera, 1, tilt=(0.4, 0.7), fill=(0.7, 0.9), noise_px=0.2, seed=seed)
     K = fccm(detections, lens="brown:k1").camera.intrinsics
     assert (K.fx, K.cx, K.cy, K.skew) == (K.fy, 319.5, 239.5, 0.0)
@@ -201,14 +266,17 @@ def test_three_views_assume_nothing():
     assert fccm(photographed(NARROW, 3, tilt=(0.4, 0.7))).assumptions == ()
 
 
-# --- views that cannot tell ------------------------------------------------------------------------------------------
+# --- views that cannot tell
+# ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("lens", LENSES)
 @pytest.mark.parametrize("noise_px", [0.0, 0.1])
 def test_views_that_are_all_parallel_to_the_image_are_refused_with_any_lens(lens, noise_px):
     detections = seen(camera_with(Brown(k1=-0.25, k2=0.08)), facing(5, np.eye(3)), noise_px=noise_px)
-    with pytest.raises(CalibrationError, match=r"its focal length is open .* 5 views show .*tilted by 20 to 45 degrees"):
+    with pytest.raises(
+        CalibrationError, match=r"its focal length is open .* 5 views show .*tilted by 20 to 45 degrees"
+    ):
         fccm(detections, lens=lens, max_steps=50)  # along this valley it would walk for ever
 
 
@@ -220,14 +288,21 @@ def test_so_they_are_with_any_number_of_views(views, noise_px, seed):
     with pytest.raises(CalibrationError, match="its focal length is open") as refusal:
         fccm(detections, lens="brown:k1,k2", max_steps=50)
     if noise_px == 0.0 or views > 3:  # noise in few views tilts them by some degrees
-        assert "parallel to one plane, and then distance and focal length cannot be told apart" in str(refusal.value)
+        assert "parallel to one plane, and then distance and focal length cannot be told apart" in str(
+            refusal.value
+        )
 
 
 def test_views_that_only_a_noise_free_detector_could_tell_from_parallel_are_refused():
     rng = np.random.default_rng(0)
-    hardly = [Pose(rotation_from_vector(rng.uniform(-0.003, 0.003, 3)) @ pose.rotation, pose.translation) for pose in facing(6, np.eye(3))]
+    hardly = [
+        Pose(rotation_from_vector(rng.uniform(-0.003, 0.003, 3)) @ pose.rotation, pose.translation)
+        for pose in facing(6, np.eye(3))
+    ]
     with pytest.raises(CalibrationError, match="parallel to one plane"):
-        fccm(seen(NARROW, hardly), lens="brown")  # exact corners do tell the camera: corners are never taken to be better than 0.1 px
+        fccm(
+            seen(NARROW, hardly), lens="brown"
+        )  # exact corners do tell the camera: corners are never taken to be better than 0.1 px
 
 
 def test_a_pinhole_that_saw_parallel_tilted_views_is_refused_too():
@@ -238,28 +313,46 @@ def test_a_pinhole_that_saw_parallel_tilted_views_is_refused_too():
 
 
 def test_views_that_are_tilted_are_not_called_parallel():
-    few = photographed(camera_with(Fet(scale=2.0, l=0.5)), 3, fill=(0.1, 0.15), noise_px=0.5)  # small boards, one after the other
-    with pytest.raises(CalibrationError, match="3 views show too little of it, or the lens has more coefficients"):
+    few = photographed(
+        camera_with(Fet(scale=2.0, l=0.5)), 3, fill=(0.1, 0.15), noise_px=0.5
+    )  # small boards, one after the other
+    with pytest.raises(
+        CalibrationError, match="3 views show too little of it, or the lens has more coefficients"
+    ):
         fccm(few, lens="pfet")
 
 
 def test_more_unknowns_than_numbers_are_refused():
-    four = [View(view.image, view.ids[[0, 8, 45, 53]], view.pixels[[0, 8, 45, 53]]) for view in photographed(NARROW, 2).views]
-    with pytest.raises(CalibrationError, match=r"8 corners in 2 views are 16 numbers, fewer than the 21 unknowns .* --lens brown:k1"):
+    four = [
+        View(view.image, view.ids[[0, 8, 45, 53]], view.pixels[[0, 8, 45, 53]])
+        for view in photographed(NARROW, 2).views
+    ]
+    with pytest.raises(
+        CalibrationError,
+        match=r"8 corners in 2 views are 16 numbers, fewer than the 21 unknowns .* --lens brown:k1",
+    ):
         fccm(Detections(BOARD, (640, 480), tuple(four)))
 
 
 def test_four_corners_a_view_are_enough_where_there_are_views():
     detections = photographed(NARROW, 12, tilt=(0.2, 0.7))
-    four = tuple(View(view.image, view.ids[[0, 8, 45, 53]], view.pixels[[0, 8, 45, 53]]) for view in detections.views)
+    four = tuple(
+        View(view.image, view.ids[[0, 8, 45, 53]], view.pixels[[0, 8, 45, 53]]) for view in detections.views
+    )
     found = fccm(replace(detections, views=four))
-    assert worst_image(NARROW, found.camera, replace(detections, views=four)) < 1e-5  # 17 numbers more than unknowns: not well conditioned
+    assert (
+        worst_image(NARROW, found.camera, replace(detections, views=four)) < 1e-5
+    )  # 17 numbers more than unknowns: not well conditioned
 
 
 def test_views_that_tell_nothing_are_set_aside_and_the_others_used():
     detections = photographed(NARROW, 6)
     odd = detections.views[0]
-    views = (*detections.views, View("few.jpg", odd.ids[:3], odd.pixels[:3]), View("row.jpg", odd.ids[:9], odd.pixels[:9]))
+    views = (
+        *detections.views,
+        View("few.jpg", odd.ids[:3], odd.pixels[:3]),
+        View("row.jpg", odd.ids[:9], odd.pixels[:9]),
+    )
     views += (replace(odd, image="again.jpg"),)
     found = fccm(replace(detections, views=views))
     assert [view.image for view in found.detections.views] == [view.image for view in detections.views]
@@ -272,7 +365,9 @@ def test_views_that_tell_nothing_are_set_aside_and_the_others_used():
 
 def test_a_board_read_in_the_wrong_order_is_refused_and_its_views_are_named():
     detections = photographed(NARROW, 6)
-    column_wise = np.arange(54).reshape(6, 9).T.ravel()  # as a detector told of 6 x 9 corners would list those of 9 x 6
+    column_wise = (
+        np.arange(54).reshape(6, 9).T.ravel()
+    )  # as a detector told of 6 x 9 corners would list those of 9 x 6
     wrong = tuple(View(view.image, np.arange(54), view.pixels[column_wise]) for view in detections.views)
     with pytest.raises(CalibrationError, match="columns and rows"):
         fccm(replace(detections, views=wrong))
@@ -282,7 +377,10 @@ def test_a_lens_of_the_plane_is_refused_for_corners_behind_the_camera():
     camera = replace(WIDE, intrinsics=Intrinsics(150.0, 151.0, 318.0, 242.0))
     detections = photographed(camera, 10)
     for lens in ("brown", "rational", "pfet", "fet", "fov", "division"):
-        with pytest.raises(CalibrationError, match=rf"up to 1\d\d degrees .* the lens '{lens}' cannot see .* --lens kannala_brandt"):
+        with pytest.raises(
+            CalibrationError,
+            match=rf"up to 1\d\d degrees .* the lens '{lens}' cannot see .* --lens kannala_brandt",
+        ):
             fccm(detections, lens=lens)
 
 
@@ -302,12 +400,15 @@ def test_settings_that_are_none_are_refused(settings, message):
 
 def test_progress_is_told_and_the_step_limit_is_said():
     heard = []
-    found = fccm(photographed(NARROW, 5, noise_px=0.2), max_steps=2, progress=lambda step, cost: heard.append(step))
+    found = fccm(
+        photographed(NARROW, 5, noise_px=0.2), max_steps=2, progress=lambda step, cost: heard.append(step)
+    )
     assert heard == [1, 2]
     assert found.status.startswith("stopped at the step limit")
 
 
-# --- uncertainty -----------------------------------------------------------------------------------------------------
+# --- uncertainty
+# -----------------------------------------------------------------------------------------------------
 
 
 def test_standard_deviations_are_the_scatter_over_repeated_photographs():
@@ -317,13 +418,19 @@ def test_standard_deviations_are_the_scatter_over_repeated_photographs():
     values = np.array([[*c.camera.intrinsics.as_tuple()[:4], *c.camera.lens.coefficients[:2]] for c in found])
     told = np.sqrt(np.mean([[c.uncertainty.deviations[name] ** 2 for name in names] for c in found], axis=0))
     assert names == ("fx", "fy", "cx", "cy", "k1", "k2")
-    assert_allclose(values.std(0, ddof=1) / told, 1.0, atol=0.39)  # 30 draws tell a deviation to 1 / sqrt(60) = 13 %: three of these
+    assert_allclose(
+        values.std(0, ddof=1) / told, 1.0, atol=0.39
+    )  # 30 draws tell a deviation to 1 / sqrt(60) = 13 %: three of these
 
 
 def test_residuals_are_predicted_minus_detected():
     detections = photographed(NARROW, 4, noise_px=0.2)
     found = fccm(detections)
-    for residuals, pose, view in zip(found.residuals(), found.camera_from_target, detections.views, strict=True):
-        assert_allclose(residuals, found.camera.project(pose.apply(BOARD.points[view.ids])) - view.pixels, atol=1e-12)
+    for residuals, pose, view in zip(
+        found.residuals(), found.camera_from_target, detections.views, strict=True
+    ):
+        assert_allclose(
+            residuals, found.camera.project(pose.apply(BOARD.points[view.ids])) - view.pixels, atol=1e-12
+        )
     assert_allclose(found.rms_px, np.sqrt((np.concatenate(found.residuals()) ** 2).sum(-1).mean()))
     assert K.skew == found.camera.intrinsics.skew == 0.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_less
 
-from laws import for_every_lens, rays_over
+from helpers.laws import for_every_lens, rays_over
 from orthoscope.geometry.arrays import InputError
 from orthoscope.models.camera import Camera, Intrinsics, image_border
 from orthoscope.models.lenses import Brown, Division, Fov, KannalaBrandt
@@ -20,7 +20,9 @@ FOLDING = Brown(k1=-0.5)  # its domain ends at s = 0.82, r_d = 0.54: inside a wi
 
 
 def pixel_grid(columns: int = 17, rows: int = 13) -> np.ndarray:
-    return np.stack(np.meshgrid(np.linspace(0, 639, columns), np.linspace(0, 479, rows)), axis=-1).reshape(-1, 2)
+    return np.stack(np.meshgrid(np.linspace(0, 639, columns), np.linspace(0, 479, rows)), axis=-1).reshape(
+        -1, 2
+    )
 
 
 def test_a_point_on_the_axis_is_seen_at_the_principal_point():
@@ -29,7 +31,8 @@ def test_a_point_on_the_axis_is_seen_at_the_principal_point():
 
 
 def test_a_worked_example_of_the_steps():
-    # x = 0.2, y = 0.1: s^2 = 0.05, g = 1 - 0.2 * 0.05 = 0.99; u = 500 * 0.198 + 0.7 * 0.099 + 310, v = 510 * 0.099 + 245
+    # x = 0.2, y = 0.1: s^2 = 0.05, g = 1 - 0.2 * 0.05 = 0.99; u = 500 * 0.198 + 0.7 * 0.099 + 310, v = 510 *
+    # 0.099 + 245
     camera = Camera(SIZE, INTRINSICS, Brown(k1=-0.2))
     assert_allclose(camera.project(np.array([[0.4, 0.2, 2.0]])), [[409.0693, 295.49]], atol=1e-10)
 
@@ -46,9 +49,13 @@ def test_project_inverts_unproject(lens_frame):
 def test_unproject_inverts_project_for_every_lens(lens):
     rays = rays_over(lens, last=0.99)
     pixels = Camera(SIZE, INTRINSICS, lens).project(rays)
-    apart = np.hypot(*(pixels - [INTRINSICS.cx, INTRINSICS.cy]).T) > 1e-3 * (lens.domain.hole > 0)  # a hole's rim is one pixel
+    apart = np.hypot(*(pixels - [INTRINSICS.cx, INTRINSICS.cy]).T) > 1e-3 * (
+        lens.domain.hole > 0
+    )  # a hole's rim is one pixel
     seen = np.isfinite(pixels).all(axis=1) & apart
-    assert_allclose(Camera(SIZE, INTRINSICS, lens).unproject(pixels[seen]), rays[seen], atol=1e-11)  # rounding of 500 px and more
+    assert_allclose(
+        Camera(SIZE, INTRINSICS, lens).unproject(pixels[seen]), rays[seen], atol=1e-11
+    )  # rounding of 500 px and more
 
 
 @for_every_lens
@@ -62,7 +69,11 @@ def test_pixels_all_over_a_large_image_come_back_to_a_billionth(lens):
     assert_allclose(camera.project(rays[seen], beyond=True), pixels[seen], atol=1e-9)
 
 
-@pytest.mark.parametrize("lens", [FOLDING, Brown(k1=-0.5, p1=1e-3, p2=-2e-3), KannalaBrandt(k1=-0.2)], ids=["brown", "decentred", "angle"])
+@pytest.mark.parametrize(
+    "lens",
+    [FOLDING, Brown(k1=-0.5, p1=1e-3, p2=-2e-3), KannalaBrandt(k1=-0.2)],
+    ids=["brown", "decentred", "angle"],
+)
 def test_of_many_pixels_those_past_the_fold_have_no_ray(lens):
     camera = Camera((2000, 1500), Intrinsics(1000.0, 1000.0, 1000.0, 750.0), lens)
     pixels = np.random.default_rng(0).uniform([0.0, 0.0], (2000, 1500), (40_000, 2))
@@ -85,7 +96,9 @@ def test_a_lens_frame_equal_to_the_intrinsics_changes_nothing():
 def test_without_distortion_a_lens_frame_changes_nothing():
     points = np.array([[0.1, -0.2, 1.0], [0.4, 0.3, 1.5]])
     assert_allclose(
-        Camera(SIZE, INTRINSICS, Brown(), LENS_FRAME).project(points), Camera(SIZE, INTRINSICS, Brown()).project(points), atol=1e-11
+        Camera(SIZE, INTRINSICS, Brown(), LENS_FRAME).project(points),
+        Camera(SIZE, INTRINSICS, Brown()).project(points),
+        atol=1e-11,
     )
 
 
@@ -99,7 +112,11 @@ def test_with_a_lens_frame_the_distortion_is_about_its_own_centre():
 def test_distort_pixels_inverts_undistort_pixels(lens_frame):
     camera = Camera(SIZE, INTRINSICS, MILD, lens_frame)
     for straight in (None, Intrinsics(300.0, 300.0, 320.0, 240.0)):
-        assert_allclose(camera.distort_pixels(camera.undistort_pixels(pixel_grid(), straight), straight), pixel_grid(), atol=1e-10)
+        assert_allclose(
+            camera.distort_pixels(camera.undistort_pixels(pixel_grid(), straight), straight),
+            pixel_grid(),
+            atol=1e-10,
+        )
 
 
 def test_what_lies_past_90_degrees_has_no_straight_pixel():
@@ -115,7 +132,9 @@ def test_the_map_says_where_each_straight_pixel_was():
     assert map_x.shape == map_y.shape == (300, 400)
     assert map_x.dtype == map_y.dtype == np.float32
     expected = camera.distort_pixels(np.array([[7.0, 3.0], [200.0, 150.0], [399.0, 299.0]]), straight)
-    found = np.array([[map_x[3, 7], map_y[3, 7]], [map_x[150, 200], map_y[150, 200]], [map_x[299, 399], map_y[299, 399]]])
+    found = np.array(
+        [[map_x[3, 7], map_y[3, 7]], [map_x[150, 200], map_y[150, 200]], [map_x[299, 399], map_y[299, 399]]]
+    )
     assert_allclose(found, expected, atol=1e-4)  # float32 at 640
 
 
@@ -130,7 +149,9 @@ def test_the_map_is_black_beyond_the_domain_and_never_folds():
     assert_array_less(s, np.sqrt(1.0 / 1.5) + 1e-6)  # 1 + 3 k1 s^2 = 0
     order = np.argsort(s)
     radius = np.hypot(map_x[seen] - 319.5, map_y[seen] - 239.5)[order]
-    assert_array_less(-1e-3, np.diff(radius))  # farther out in the straight image is farther out in the photograph, to float32
+    assert_array_less(
+        -1e-3, np.diff(radius)
+    )  # farther out in the straight image is farther out in the photograph, to float32
 
 
 def test_the_map_is_black_outside_the_photograph():
@@ -147,7 +168,9 @@ STRAIGHTENED = {
     "pincushion": Camera(SIZE, Intrinsics(500.0, 510.0, 310.0, 245.0), Brown(k1=0.2)),
     "fov": Camera(SIZE, Intrinsics(300.0, 300.0, 320.0, 240.0), Fov(w=0.9)),
     "division": Camera(SIZE, Intrinsics(400.0, 400.0, 320.0, 240.0), Division(l=-0.3)),
-    "lens frame": Camera(SIZE, Intrinsics(500.0, 510.0, 310.0, 245.0), MILD, Intrinsics(500.0, 510.0, 330.0, 230.0)),
+    "lens frame": Camera(
+        SIZE, Intrinsics(500.0, 510.0, 310.0, 245.0), MILD, Intrinsics(500.0, 510.0, 330.0, 230.0)
+    ),
 }
 FOR_EVERY_STRAIGHTENED = pytest.mark.parametrize("camera", STRAIGHTENED.values(), ids=STRAIGHTENED.keys())
 
@@ -156,7 +179,9 @@ FOR_EVERY_STRAIGHTENED = pytest.mark.parametrize("camera", STRAIGHTENED.values()
 def test_keeping_all_shows_every_photographed_pixel(camera):
     straight = camera.straight_intrinsics("all")
     border = camera.undistort_pixels(image_border(SIZE), straight)
-    assert_allclose([border.min(0), border.max(0)], [[0.0, 0.0], [639.0, 479.0]], atol=1e-6)  # all, and nothing wasted
+    assert_allclose(
+        [border.min(0), border.max(0)], [[0.0, 0.0], [639.0, 479.0]], atol=1e-6
+    )  # all, and nothing wasted
 
 
 @FOR_EVERY_STRAIGHTENED
@@ -172,7 +197,9 @@ def test_a_fisheye_is_kept_to_the_widest_angle():
     straight = camera.straight_intrinsics("all", widest=np.deg2rad(70.0))
     rays = np.array([[np.sin(1.2), 0.0, np.cos(1.2)]])  # 69 degrees
     assert_array_less(straight.to_pixels(rays[:, :2] / rays[:, 2:])[:, 0], 640.0)
-    assert straight.to_pixels(np.array([[np.tan(np.deg2rad(70.0)), 0.0]]))[0, 0] == pytest.approx(639.0, abs=0.5)
+    assert straight.to_pixels(np.array([[np.tan(np.deg2rad(70.0)), 0.0]]))[0, 0] == pytest.approx(
+        639.0, abs=0.5
+    )
 
 
 def test_another_word_for_keep_is_refused():

@@ -13,9 +13,13 @@ FOR_EVERY_CHART = pytest.mark.parametrize("chart", [GNOMONIC, EQUIDISTANT], ids=
 
 def rays_within(angle: float) -> np.ndarray:
     """Rays of several lengths, to `angle` from the axis, the axis itself and its neighbourhood among them."""
-    theta = np.concatenate([[0.0, 1e-12, 1e-6, 0.9e-4, 1.1e-4, 1e-2, 0.05, 0.09], np.linspace(0.1, angle, 20)])
+    theta = np.concatenate(
+        [[0.0, 1e-12, 1e-6, 0.9e-4, 1.1e-4, 1e-2, 0.05, 0.09], np.linspace(0.1, angle, 20)]
+    )
     phi = np.linspace(0.0, 2.0 * np.pi, 9)[:, None]
-    rays = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta) + 0.0 * phi], axis=-1).reshape(-1, 3)
+    rays = np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta) + 0.0 * phi], axis=-1
+    ).reshape(-1, 3)
     return rays * np.linspace(0.5, 3.0, len(rays))[:, None]
 
 
@@ -56,7 +60,8 @@ def test_pull_back_is_the_derivative_by_differences(chart):
     for axis in range(3):
         shift = step * np.eye(3)[axis]
         difference = np.stack(chart.flatten(*(rays + shift).T)) - np.stack(chart.flatten(*(rays - shift).T))
-        # step^2 times a third derivative, which grows as 1 / cos^4 (gnomonic) and 1 / sin^3 (equidistant) up to 1e5; rounding over step
+        # step^2 times a third derivative, which grows as 1 / cos^4 (gnomonic) and 1 / sin^3 (equidistant) up
+        # to 1e5; rounding over step
         assert_allclose(exact[:, :, axis], difference / (2.0 * step), rtol=1e-6, atol=1e-7)
 
 
@@ -66,7 +71,9 @@ def test_a_pin_hole_sees_nothing_beside_or_behind_itself():
 
 
 def test_the_equidistant_chart_has_all_directions_but_straight_back():
-    x, y = EQUIDISTANT.flatten(*np.array([[1.0, 0.0, 0.0], [0.0, -1.0, -1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]]).T)
+    x, y = EQUIDISTANT.flatten(
+        *np.array([[1.0, 0.0, 0.0], [0.0, -1.0, -1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]]).T
+    )
     assert_allclose(x, [np.pi / 2, 0.0, np.nan, np.nan], atol=1e-15)
     assert_allclose(y, [0.0, -0.75 * np.pi, np.nan, np.nan], atol=1e-15)
 

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from laws import FREE_LENSES_TO_TRY, displaced, rays_over
+from helpers.laws import FREE_LENSES_TO_TRY, displaced, rays_over
 from orthoscope.geometry.arrays import InputError
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import FREE, Brown, KannalaBrandt, lens_name
 
-for_every_free_lens = pytest.mark.parametrize("lens", FREE_LENSES_TO_TRY.values(), ids=FREE_LENSES_TO_TRY.keys())
+for_every_free_lens = pytest.mark.parametrize(
+    "lens", FREE_LENSES_TO_TRY.values(), ids=FREE_LENSES_TO_TRY.keys()
+)
 
 
 @for_every_free_lens
@@ -52,12 +54,16 @@ def test_a_displacement_sees_past_90_degrees():
 def test_where_a_displacement_pushes_the_image_out_more_is_seen_than_by_its_base():
     base = Brown(k1=-0.2)  # folds at s = 1.29, where r_d = 0.86
     lens = displaced(base, (1.0, 1.0), 0.0)
-    rather = FreeLens(base, type(lens.over)(lens.over.lattice, np.full((lens.over.lattice.splines, 2), [0.1, 0.0])))
+    rather = FreeLens(
+        base, type(lens.over)(lens.over.lattice, np.full((lens.over.lattice.splines, 2), [0.1, 0.0]))
+    )
     rays = rays_over(base, last=0.999)
     pushed = rather.distort(rays)
     beyond = np.hypot(*pushed.T) > 0.87  # past all that the base images
     assert beyond.sum() > 20
-    assert_allclose(rather.undistort(pushed[beyond]), rays[beyond], atol=1e-9)  # beside the fold the inverse is steep
+    assert_allclose(
+        rather.undistort(pushed[beyond]), rays[beyond], atol=1e-9
+    )  # beside the fold the inverse is steep
 
 
 def test_a_free_lens_over_a_free_lens_is_refused():

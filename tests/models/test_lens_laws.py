@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_less
 
-from laws import LENSES_TO_TRY, directions, for_every_formula, for_every_lens, places_over, rays_over
+from helpers.laws import LENSES_TO_TRY, directions, for_every_formula, for_every_lens, places_over, rays_over
 from orthoscope.geometry.arrays import InputError
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import LENSES, Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
@@ -35,7 +35,8 @@ def test_every_ray_of_the_domain_has_an_image(lens):
 @for_every_lens
 def test_undistort_inverts_distort(lens):
     rays = is_seen(lens, rays_over(lens))
-    # up to 1e-4 before a fold the inverse's slope is below 1e4: rounding of the image, 1e-16 times its size, grows by that
+    # up to 1e-4 before a fold the inverse's slope is below 1e4: rounding of the image, 1e-16 times its size,
+    # grows by that
     assert_allclose(lens.undistort(lens.distort(rays)), rays, atol=1e-11)
 
 
@@ -44,7 +45,9 @@ def test_the_last_rays_before_the_end_come_back(lens):
     rays = is_seen(lens, rays_over(lens, last=1.0 - 1e-9))
     plane = lens.distort(rays)
     back = lens.undistort(plane)
-    assert_allclose(back, rays, atol=1e-6)  # at a fold the inverse is a square root: 1e-16 becomes 1e-8, times the curve's scale
+    assert_allclose(
+        back, rays, atol=1e-6
+    )  # at a fold the inverse is a square root: 1e-16 becomes 1e-8, times the curve's scale
     near = np.abs(plane).max(axis=1) < 50.0  # beside a pole a rounding of the ray is a mile in the image
     assert_allclose(lens.distort(back[near], beyond=True), plane[near], rtol=1e-9, atol=1e-12)
 
@@ -74,7 +77,9 @@ def test_beyond_the_domain_there_is_no_image(lens):
     limit = lens.chart.radius(lens.chart.reach - 1e-3)
     s = np.outer([1.02, 1.1, 1.5, 3.0, 10.0], ends[ends < limit / 1.02])
     s[s > limit] = np.nan
-    rays = lens.chart.lift(s * np.cos(angles[ends < limit / 1.02]), s * np.sin(angles[ends < limit / 1.02])).reshape(-1, 3)
+    rays = lens.chart.lift(
+        s * np.cos(angles[ends < limit / 1.02]), s * np.sin(angles[ends < limit / 1.02])
+    ).reshape(-1, 3)
     assert np.isnan(lens.distort(rays)).all()
 
 
@@ -103,7 +108,10 @@ def test_no_places_give_no_rays(lens):
     assert lens.distort(np.empty((0, 3))).shape == (0, 2)
 
 
-@pytest.mark.parametrize("name", ["brown mild", "brown strong", "pfet with a ring", "division pincushion", "kannala_brandt folding"])
+@pytest.mark.parametrize(
+    "name",
+    ["brown mild", "brown strong", "pfet with a ring", "division pincushion", "kannala_brandt folding"],
+)
 def test_past_the_image_of_a_fold_nothing_is_seen(name):
     lens = LENSES_TO_TRY[name]
     end = np.hypot(*lens.distort(is_seen(lens, rays_over(lens, last=1.0 - 1e-9))).T).max()
@@ -116,19 +124,24 @@ def test_the_formula_and_its_linearisation_agree(lens):
     x, y = places_over(lens, last=0.95, widest=3.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         at = lens.linearise(x, y)
-        assert_allclose(np.stack([at.x, at.y]), np.stack(lens.warp(x, y)), rtol=1e-13, atol=1e-14)  # the order of sums differs
+        assert_allclose(
+            np.stack([at.x, at.y]), np.stack(lens.warp(x, y)), rtol=1e-13, atol=1e-14
+        )  # the order of sums differs
 
 
 @for_every_lens
 def test_jacobians_by_place_are_those_of_differences(lens):
     x, y = places_over(lens, last=0.95, widest=3.0)
-    apart = np.hypot(x, y) > 1e-2 + 1.2 * lens.domain.hole  # at the centre a curve may have a corner: next test
+    apart = (
+        np.hypot(x, y) > 1e-2 + 1.2 * lens.domain.hole
+    )  # at the centre a curve may have a corner: next test
     x, y = x[apart], y[apart]
     at, step = lens.linearise(x, y), 1e-5
     for (dx, dy), (by_x, by_y) in {(1, 0): (at.j_xx, at.j_yx), (0, 1): (at.j_xy, at.j_yy)}.items():
         after, before = lens.warp(x + step * dx, y + step * dy), lens.warp(x - step * dx, y - step * dy)
         for exact, plus, minus in zip((by_x, by_y), after, before, strict=True):
-            # error of a central difference: step^2 times the third derivative, here up to some 10, and rounding over step
+            # error of a central difference: step^2 times the third derivative, here up to some 10, and
+            # rounding over step
             assert_allclose(exact, (plus - minus) / (2 * step), rtol=1e-6, atol=1e-8)
 
 
@@ -137,7 +150,8 @@ def test_at_the_centre_the_jacobian_is_the_gain(name):
     lens = LENSES_TO_TRY[name]
     at, (g, _) = lens.linearise(np.zeros(1), np.zeros(1)), lens.gain(np.zeros(1))
     jacobian = np.array([[at.j_xx[0], at.j_xy[0]], [at.j_yx[0], at.j_yy[0]]])
-    # OpenCV's tilt turns the sensor about the axis' foot: cos(tau) squashes what it turns away, at most by 0.08^2
+    # OpenCV's tilt turns the sensor about the axis' foot: cos(tau) squashes what it turns away, at most by
+    # 0.08^2
     assert_allclose(jacobian, g[0] * np.eye(2), atol=0.01 if "tilted" in name else ROUNDING)
 
 
@@ -145,7 +159,9 @@ def test_at_the_centre_the_jacobian_is_the_gain(name):
 def test_jacobians_by_each_coefficient_are_those_of_differences(lens):
     x, y = places_over(lens, last=0.9, widest=1.5)
     s = np.hypot(x, y)
-    tried = (s > 1e-2 + 1.2 * lens.domain.hole) & (s < 1.8)  # farther out a coefficient's powers carry a displacement over its knots
+    tried = (s > 1e-2 + 1.2 * lens.domain.hole) & (
+        s < 1.8
+    )  # farther out a coefficient's powers carry a displacement over its knots
     x, y = x[tried], y[tried]
     names = lens.names()
     at = lens.linearise(x, y, names)
@@ -161,7 +177,9 @@ def test_jacobians_by_each_coefficient_are_those_of_differences(lens):
 @for_every_formula
 def test_coefficients_come_in_the_order_of_their_names(lens):
     again = type(lens)(*lens.coefficients)
-    assert dict(zip(lens.names(), again.coefficients, strict=True)) == {name: getattr(lens, name) for name in lens.names()}
+    assert dict(zip(lens.names(), again.coefficients, strict=True)) == {
+        name: getattr(lens, name) for name in lens.names()
+    }
 
 
 @for_every_lens
@@ -209,7 +227,9 @@ def test_kannala_brandt_sees_behind_itself():
     assert_allclose(KannalaBrandt().undistort(np.array([[2.0, 0.0]])), ray, atol=1e-15)
 
 
-@pytest.mark.parametrize("lens", [Pfet(a1=-1.0), Fet(scale=-1.0, l=0.5), Fov(w=3.5)], ids=["pfet", "fet", "fov"])
+@pytest.mark.parametrize(
+    "lens", [Pfet(a1=-1.0), Fet(scale=-1.0, l=0.5), Fov(w=3.5)], ids=["pfet", "fet", "fov"]
+)
 def test_a_lens_turned_inside_out_sees_nothing(lens):
     assert np.isnan(lens.distort(np.array([[0.1, 0.2, 1.0], [0.0, 0.0, 1.0]]))).all()
     assert np.isnan(lens.undistort(np.array([[0.1, 0.2], [0.0, 0.0]]))).all()

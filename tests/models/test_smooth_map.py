@@ -1,4 +1,6 @@
-"""Maps that are interpolated between few places are as good as float32, and end where they would end if every pixel were asked."""
+"""Maps that are interpolated between few places are as good as float32, and end where they would end if every
+pixel were asked.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from laws import for_every_lens
+from helpers.laws import for_every_lens
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import Brown
@@ -14,7 +16,8 @@ from orthoscope.models.smooth_map import TOLERANCE, smooth_map
 from orthoscope.models.spline import Displacement, Lattice
 
 SIZE = (333, 260)  # no multiple of a tile
-AS_FLOAT32 = 8e-5  # px: float32 sums of numbers up to 1000 px, as tiles have that reach out of the photograph, round by 6e-5
+# px: float32 sums of numbers up to 1000 px, as tiles have that reach out of the photograph, round by 6e-5
+AS_FLOAT32 = 8e-5
 
 
 def everywhere(pixels):
@@ -23,7 +26,9 @@ def everywhere(pixels):
 
 def asked_for_each(camera: Camera, straight: Intrinsics, size: tuple[int, int]) -> np.ndarray:
     """The map as its docstring has it, pixel by pixel."""
-    pixels = np.stack(np.meshgrid(np.arange(size[0]), np.arange(size[1])), axis=-1).reshape(-1, 2).astype(float)
+    pixels = (
+        np.stack(np.meshgrid(np.arange(size[0]), np.arange(size[1])), axis=-1).reshape(-1, 2).astype(float)
+    )
     places = camera.distort_pixels(pixels, straight)
     outside = ((places < -1.0) | (places > np.array(camera.image_size))).any(axis=1)
     places[outside] = np.nan
@@ -33,7 +38,10 @@ def asked_for_each(camera: Camera, straight: Intrinsics, size: tuple[int, int]) 
 @for_every_lens
 @pytest.mark.parametrize("focal", [60.0, 250.0], ids=["wide", "narrow"])
 def test_every_lens_is_mapped_as_if_each_pixel_had_been_asked(lens, focal):
-    camera, straight = Camera(SIZE, Intrinsics(250.0, 255.0, 160.0, 131.0, skew=0.5), lens), Intrinsics(focal, focal, 170.0, 125.0)
+    camera, straight = (
+        Camera(SIZE, Intrinsics(250.0, 255.0, 160.0, 131.0, skew=0.5), lens),
+        Intrinsics(focal, focal, 170.0, 125.0),
+    )
     exact = asked_for_each(camera, straight, SIZE)
     maps = np.stack(camera.undistort_map(straight))
     assert_array_equal(np.isnan(maps), np.isnan(exact))
@@ -42,7 +50,9 @@ def test_every_lens_is_mapped_as_if_each_pixel_had_been_asked(lens, focal):
 
 def test_a_usual_lens_is_mapped_as_well_as_float32_can_say():
     camera = Camera(SIZE, Intrinsics(250.0, 255.0, 160.0, 131.0), Brown(-0.28, 0.09, 8e-4, -5e-4, -0.01))
-    assert_allclose(np.stack(camera.undistort_map()), asked_for_each(camera, camera.intrinsics, SIZE), atol=AS_FLOAT32)
+    assert_allclose(
+        np.stack(camera.undistort_map()), asked_for_each(camera, camera.intrinsics, SIZE), atol=AS_FLOAT32
+    )
 
 
 def test_a_lens_about_its_own_centre_is_mapped_as_if_each_pixel_had_been_asked():
@@ -56,8 +66,12 @@ def test_a_lens_about_its_own_centre_is_mapped_as_if_each_pixel_had_been_asked()
 
 def test_a_free_lens_is_mapped_to_a_thousandth_of_a_pixel():
     lattice = Lattice.over(np.array([-0.7, -0.6]), np.array([0.7, 0.6]), (7, 5))
-    waves = 2.0 / 250.0 * np.random.default_rng(0).normal(size=(lattice.splines, 2))  # 2 px from one cell to the next
-    camera = Camera(SIZE, Intrinsics(250.0, 250.0, 160.0, 131.0), FreeLens(Brown(k1=-0.2), Displacement(lattice, waves)))
+    waves = (
+        2.0 / 250.0 * np.random.default_rng(0).normal(size=(lattice.splines, 2))
+    )  # 2 px from one cell to the next
+    camera = Camera(
+        SIZE, Intrinsics(250.0, 250.0, 160.0, 131.0), FreeLens(Brown(k1=-0.2), Displacement(lattice, waves))
+    )
     exact = asked_for_each(camera, camera.intrinsics, SIZE)
     maps = np.stack(camera.undistort_map())
     assert_array_equal(np.isnan(maps), np.isnan(exact))

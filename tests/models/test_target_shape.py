@@ -1,4 +1,6 @@
-"""Surfaces over a target are orthogonal, of unit size, without what poses do already; a shape says what it is and no more."""
+"""Surfaces over a target are orthogonal, of unit size, without what poses do already; a shape says what it is
+and no more.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,8 @@ from scipy.stats import ortho_group
 
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import rotation_from_vector
-from orthoscope.geometry.target import chessboard
 from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
+from orthoscope.targets.detections import chessboard
 
 POINTS = chessboard(9, 6, 0.025).points
 ALL = np.ones(len(POINTS), dtype=bool)
@@ -42,7 +44,9 @@ def test_surfaces_of_higher_orders_have_nothing_of_lower_ones(seen):
     x, y = POINTS[:, :2].T
     lower = np.stack([np.ones_like(x), 40.0 * x, 40.0 * y])[:, seen]
     assert_allclose(lower @ polynomials(POINTS, seen, orders=(2, 3, 4))[seen], 0.0, atol=1e-11)
-    assert_allclose(lower[0] @ polynomials(POINTS, seen)[seen], 0.0, atol=1e-12)  # so none shifts the whole target
+    assert_allclose(
+        lower[0] @ polynomials(POINTS, seen)[seen], 0.0, atol=1e-12
+    )  # so none shifts the whole target
 
 
 def test_corners_that_were_not_seen_stay_where_they_are():
@@ -52,7 +56,9 @@ def test_corners_that_were_not_seen_stay_where_they_are():
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 1e3])
 def test_neither_the_unit_of_length_nor_the_origin_matters(unit):
     moved = unit * (POINTS + np.array([0.3, -7.0, 0.0]))
-    assert_allclose(np.abs(polynomials(moved, ALL)), np.abs(polynomials(POINTS, ALL)), atol=1e-9)  # 7 m away: digits are lost
+    assert_allclose(
+        np.abs(polynomials(moved, ALL)), np.abs(polynomials(POINTS, ALL)), atol=1e-9
+    )  # 7 m away: digits are lost
 
 
 def test_few_corners_have_as_many_surfaces_as_they_can_tell_apart():

@@ -8,29 +8,44 @@ import numpy as np
 import pytest
 
 from orthoscope.evaluation.evaluate import Evaluation, ViewError
-from orthoscope.evaluation.misfit import misfit
+from orthoscope.evaluation.misfit.misfit import misfit
+from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty, rms
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.geometry.target import Detections, SetAside, Target, View, chessboard
-from orthoscope.methods.calibration import Calibration, Candidate, Uncertainty, rms
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
+from orthoscope.targets.detections import Detections, SetAside, Target, View, chessboard
 
 NOISE = 0.15  # px per coordinate
-PRINT = np.stack([1e-3 * np.sin(np.arange(54)), 2e-4 * (np.arange(54) // 9), 2e-3 * np.cos(np.arange(54) // 9)], axis=-1)  # metres
+PRINT = np.stack(
+    [1e-3 * np.sin(np.arange(54)), 2e-4 * (np.arange(54) // 9), 2e-3 * np.cos(np.arange(54) // 9)], axis=-1
+)  # metres
 
 
 def photographed(
-    camera: Camera, target: Target, views: int, *, tilt: float, distance: float, turn: float = 0.0, seed: int = 1
+    camera: Camera,
+    target: Target,
+    views: int,
+    *,
+    tilt: float,
+    distance: float,
+    turn: float = 0.0,
+    seed: int = 1,
 ) -> Calibration:
     """`views` boards at about `distance` metres, the corners that fall in the frame seen with noise.
 
-    tilt: boards are turned in themselves by up to this about each axis; turn: and carried around the camera by up to this (radians).
+    tilt: boards are turned in themselves by up to this about each axis; turn: and carried around the camera
+    by up to this (radians).
     """
     generator = np.random.default_rng(seed)
     poses = [_pose(generator, target, tilt, distance, turn) for _ in range(views)]
     seen = [_seen(camera, pose, target, f"left{i + 1:02d}.jpg", generator) for i, pose in enumerate(poses)]
-    detections = Detections(target, camera.image_size, tuple(seen), (SetAside("<blurred> & dark.jpg", "no chessboard of 9x6 found"),))
+    detections = Detections(
+        target,
+        camera.image_size,
+        tuple(seen),
+        (SetAside("<blurred> & dark.jpg", "no chessboard of 9x6 found"),),
+    )
     return Calibration(
         camera=camera,
         camera_from_target=tuple(poses),
@@ -49,7 +64,9 @@ def evaluated(calibration: Calibration, *, held_out: bool = True) -> Evaluation:
     residuals = calibration.residuals()
     factor = 1.1 if held_out else np.nan
     views = tuple(
-        ViewError(view.image, len(view.ids), rms(e) if len(e) else np.nan, factor * rms(e) if len(e) else np.nan)
+        ViewError(
+            view.image, len(view.ids), rms(e) if len(e) else np.nan, factor * rms(e) if len(e) else np.nan
+        )
         for view, e in zip(calibration.detections.views, residuals, strict=True)
     )
     size = np.sqrt((np.concatenate(residuals) ** 2).sum(-1))
@@ -67,7 +84,10 @@ def evaluated(calibration: Calibration, *, held_out: bool = True) -> Evaluation:
         held_out_residuals=tuple(factor * e for e in residuals),
         suspects=(),
         warnings=(),
-        verdict="0.24 ± 0.01 px on photographs that were not used (0.21 px on those that were); it holds over 87 % of the frame.",
+        verdict=(
+            "0.24 ± 0.01 px on photographs that were not used (0.21 px on those that were); it holds over 87"
+            " % of the frame."
+        ),
     )
 
 
@@ -77,17 +97,27 @@ def with_suspect(evaluation: Evaluation, index: int = 3) -> Evaluation:
     views = list(calibration.detections.views)
     views[index] = replace(views[index], pixels=views[index].pixels + np.array([1.2, -0.9]))
     calibration = replace(calibration, detections=replace(calibration.detections, views=tuple(views)))
-    return replace(evaluated(calibration), suspects=((views[index].image, "its error is 7 times that of the others"),))
+    return replace(
+        evaluated(calibration), suspects=((views[index].image, "its error is 7 times that of the others"),)
+    )
 
 
 def narrow_camera() -> Camera:
     """640x480, 62 degrees, the barrel distortion of a cheap lens."""
-    return Camera((640, 480), Intrinsics(536.1, 536.3, 342.4, 235.5), Brown(k1=-0.281, k2=0.091, p1=0.0008, p2=-0.0003, k3=-0.02))
+    return Camera(
+        (640, 480),
+        Intrinsics(536.1, 536.3, 342.4, 235.5),
+        Brown(k1=-0.281, k2=0.091, p1=0.0008, p2=-0.0003, k3=-0.02),
+    )
 
 
 def fisheye_camera() -> Camera:
     """640x720, past 90 degrees from the axis; the frame's corners have no ray."""
-    return Camera((640, 720), Intrinsics(205.0, 205.4, 318.2, 361.7), KannalaBrandt(k1=0.01, k2=-0.02, k3=0.004, k4=-0.0012))
+    return Camera(
+        (640, 720),
+        Intrinsics(205.0, 205.4, 318.2, 361.7),
+        KannalaBrandt(k1=0.01, k2=-0.02, k3=0.004, k4=-0.0012),
+    )
 
 
 @pytest.fixture(scope="session")
@@ -97,7 +127,9 @@ def ordinary() -> Evaluation:
 
 @pytest.fixture(scope="session")
 def fisheye() -> Evaluation:
-    evaluation = evaluated(photographed(fisheye_camera(), chessboard(9, 6, 0.04), 20, tilt=0.4, distance=0.2, turn=1.2))
+    evaluation = evaluated(
+        photographed(fisheye_camera(), chessboard(9, 6, 0.04), 20, tilt=0.4, distance=0.2, turn=1.2)
+    )
     return replace(evaluation, warnings=("No corners were seen in a third of the frame.",))
 
 
@@ -115,15 +147,22 @@ def single(ordinary) -> Evaluation:
         uncertainty=Uncertainty(("fx=fy", "k1"), np.diag([4.0, 1e-4])),
         assumptions=("One view cannot tell the principal point: it was taken to be the image's middle.",),
     )
-    return replace(evaluated(calibration, held_out=False), nce=np.nan, coverage=np.nan, warnings=("Only one view.",))
+    return replace(
+        evaluated(calibration, held_out=False), nce=np.nan, coverage=np.nan, warnings=("Only one view.",)
+    )
 
 
 @pytest.fixture(scope="session")
 def unheld(ordinary) -> Evaluation:
     """No held-out errors, no uncertainty, and a corner without image."""
     calibration = ordinary.calibration
-    poses = (Pose(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, -1.0])), *calibration.camera_from_target[1:])  # the first lies behind
-    calibration = replace(calibration, camera_from_target=poses, uncertainty=Uncertainty((), np.zeros((0, 0))))
+    poses = (
+        Pose(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, -1.0])),
+        *calibration.camera_from_target[1:],
+    )  # the first lies behind
+    calibration = replace(
+        calibration, camera_from_target=poses, uncertainty=Uncertainty((), np.zeros((0, 0)))
+    )
     return replace(evaluated(calibration, held_out=False), rms_px=np.nan)
 
 
@@ -131,19 +170,29 @@ def unheld(ordinary) -> Evaluation:
 def misshapen(ordinary) -> Evaluation:
     """A board whose print is stretched and wavy, taken as flat and true."""
     calibration = ordinary.calibration
-    true = replace(calibration.detections.target, points=calibration.detections.target.points + PRINT * [1.0, 1.0, 0.0])
+    true = replace(
+        calibration.detections.target, points=calibration.detections.target.points + PRINT * [1.0, 1.0, 0.0]
+    )
     poses, camera = calibration.camera_from_target, calibration.camera
     shifts = (
-        (camera.project(pose.apply(true.points)) - camera.project(pose.apply(calibration.detections.target.points)))[view.ids]
+        (
+            camera.project(pose.apply(true.points))
+            - camera.project(pose.apply(calibration.detections.target.points))
+        )[view.ids]
         for pose, view in zip(poses, calibration.detections.views, strict=True)
     )
-    views = (replace(view, pixels=view.pixels + shift) for view, shift in zip(calibration.detections.views, shifts, strict=True))
+    views = (
+        replace(view, pixels=view.pixels + shift)
+        for view, shift in zip(calibration.detections.views, shifts, strict=True)
+    )
     return evaluated(replace(calibration, detections=replace(calibration.detections, views=tuple(views))))
 
 
 @pytest.fixture(scope="session")
 def shaped(misshapen) -> Evaluation:
-    """The same with its shape estimated, and a formula that was chosen among others and stands for a free lens."""
+    """The same with its shape estimated, and a formula that was chosen among others and stands for a free
+    lens.
+    """
     camera = misshapen.calibration.camera
     other = replace(camera, lens=camera.lens.with_coefficients(k1=-0.279))
     tried = (Candidate("flat", "brown", 0.31, 0.02, 0.09), Candidate("free", "brown", 0.22, 0.01, 0.0))
@@ -152,7 +201,9 @@ def shaped(misshapen) -> Evaluation:
 
 
 @pytest.fixture(scope="session")
-def every_evaluation(ordinary, fisheye, suspicious, single, unheld, misshapen, shaped) -> dict[str, Evaluation]:
+def every_evaluation(
+    ordinary, fisheye, suspicious, single, unheld, misshapen, shaped
+) -> dict[str, Evaluation]:
     """All of the above by name."""
     return {
         "ordinary": ordinary,

@@ -1,4 +1,6 @@
-"""The figure and the page of a comparison: all entrants in order, also those that could not; closed, escaped, the same every time."""
+"""The figure and the page of a comparison: all entries in order, also those that could not; closed, escaped,
+the same every time.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +11,22 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from orthoscope.evaluation.compare import Comparison, Standing
-from orthoscope.evaluation.entrants import Entrant
+from orthoscope.evaluation.comparison.compare import Comparison, Standing
+from orthoscope.evaluation.comparison.entry import Entry
+from orthoscope.geometry.numbers import ABSENT
 from orthoscope.report.comparison import comparison_page, comparison_svg, rows
 from orthoscope.report.figures.comparison import comparison_errors
-from orthoscope.report.numbers import ABSENT
 
-ERRORS = {"near": ((0.12, 0.0), (0.19, 0.07)), "far": ((0.12, 0.0), (0.19, 0.07), (7.0, 6.88)), "exact": ((0.0, 0.0), (0.0, 0.0))}
+ERRORS = {
+    "near": ((0.12, 0.0), (0.19, 0.07)),
+    "far": ((0.12, 0.0), (0.19, 0.07), (7.0, 6.88)),
+    "exact": ((0.0, 0.0), (0.0, 0.0)),
+}
 REASON = "no photograph shows <3> corners of a row & column"
 
 
 def unable(calibration, failure: str = REASON) -> Standing:
-    return Standing(Entrant("nmldc:<pfet>", "nmldc", {}), np.full(14, np.nan), calibration, failure=failure)
+    return Standing(Entry("nmldc:<pfet>", "nmldc", {}), np.full(14, np.nan), calibration, failure=failure)
 
 
 def standing(calibration, name: str, held_out_px: float, loses_px: float) -> Standing:
@@ -31,13 +37,26 @@ def standing(calibration, name: str, held_out_px: float, loses_px: float) -> Sta
         "seconds": 0.0123,
         "loses_error_px": 0.1 * loses_px,
     }
-    return Standing(Entrant(name, "fccm", {}), np.ones(14), calibration, held_out_px, 0.05 * held_out_px, loses_px, **numbers)
+    return Standing(
+        Entry(name, "fccm", {}),
+        np.ones(14),
+        calibration,
+        held_out_px,
+        0.05 * held_out_px,
+        loses_px,
+        **numbers,
+    )
 
 
 @pytest.fixture(params=[*ERRORS, "nobody"])
 def comparison(request, ordinary) -> Comparison:
-    judged = [standing(ordinary.calibration, f"fccm:lens{i}", *pair) for i, pair in enumerate(ERRORS.get(request.param, ()))]
-    return Comparison(ordinary.calibration.detections, 5, (*judged, unable(None), unable(ordinary.calibration)))
+    judged = [
+        standing(ordinary.calibration, f"fccm:lens{i}", *pair)
+        for i, pair in enumerate(ERRORS.get(request.param, ()))
+    ]
+    return Comparison(
+        ordinary.calibration.detections, 5, (*judged, unable(None), unable(ordinary.calibration))
+    )
 
 
 @pytest.fixture
@@ -50,7 +69,9 @@ def test_the_figure_has_a_named_row_for_each_and_axes_with_units(comparison):
     figure = comparison_errors(comparison)
     assert isinstance(figure, Figure)
     left, right = figure.axes
-    assert [label.get_text() for label in left.get_yticklabels()] == [each.entrant.name for each in comparison.standings]
+    assert [label.get_text() for label in left.get_yticklabels()] == [
+        each.entry.name for each in comparison.standings
+    ]
     assert (left.get_xlabel(), right.get_xlabel()) == ("error (px per point)", "loses against the best (px)")
     top, bottom = left.transData.transform([(1.0, 0.0), (1.0, 1.0)])[:, 1]
     assert top > bottom  # the best on top
@@ -67,7 +88,12 @@ def test_errors_that_differ_much_are_drawn_on_a_logarithmic_axis_and_others_from
 
 def test_its_dots_are_the_errors(far):
     left, right = comparison_errors(far).axes
-    dots = [np.array(line.get_xydata()) for axes in (left, right) for line in axes.lines if line.get_marker() == "o"]
+    dots = [
+        np.array(line.get_xydata())
+        for axes in (left, right)
+        for line in axes.lines
+        if line.get_marker() == "o"
+    ]
     np.testing.assert_allclose(dots[0], [(0.12, 0), (0.19, 1), (7.0, 2)])
     np.testing.assert_allclose(dots[1], [(0.0, 0), (0.07, 1), (6.88, 2)])
 

@@ -14,7 +14,9 @@ CENTRED = Intrinsics(500.0, 500.0, 319.5, 239.5)
 
 def test_a_pin_hole_has_the_textbooks_angles():
     half = np.arctan([320 / 500, 240 / 500, 400 / 500])
-    assert_allclose(field_of_view(Camera((640, 480), CENTRED, Brown())), 2 * half, atol=1e-12)  # 512 angles summed
+    assert_allclose(
+        field_of_view(Camera((640, 480), CENTRED, Brown())), 2 * half, atol=1e-12
+    )  # 512 angles summed
 
 
 def test_an_off_centre_pin_hole_has_unequal_halves():

@@ -15,10 +15,9 @@ from matplotlib.quiver import Quiver
 from numpy.testing import assert_allclose
 from PIL import Image  # comes with matplotlib
 
-from orthoscope.evaluation.cells import Cells, cells_for
-from orthoscope.evaluation.misfit import misfit
+from orthoscope.evaluation.misfit.misfit import misfit
 from orthoscope.geometry.arrays import InputError
-from orthoscope.geometry.target import Detections
+from orthoscope.geometry.cells import Cells, cells_for
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import LENSES, Brown, KannalaBrandt
 from orthoscope.report.figures import (
@@ -35,8 +34,15 @@ from orthoscope.report.figures import (
 from orthoscope.report.figures.lens import _along_angles, distortion_curve
 from orthoscope.report.figures.style import RED
 from orthoscope.report.plates import PLATES
+from orthoscope.targets.detections import Detections
 
-KINDS = ("ordinary", "fisheye", "unheld", "misshapen", "shaped")  # pages of all of them are drawn in test_page.py
+KINDS = (
+    "ordinary",
+    "fisheye",
+    "unheld",
+    "misshapen",
+    "shaped",
+)  # pages of all of them are drawn in test_page.py
 UNITS = ("(px)", "(mm)", "(px per point)", "(m)", "(°)", "(name)", "(number in the table below)")
 
 for_every_plate = pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
@@ -61,7 +67,14 @@ def test_every_figure_of_every_evaluation_has_labelled_axes_with_units(plate, ki
 def test_a_calibration_without_corners_still_has_its_figures(plate, ordinary):
     empty = Detections(ordinary.calibration.detections.target, (640, 480), ())
     calibration = replace(ordinary.calibration, detections=empty, camera_from_target=())
-    nothing = replace(ordinary, calibration=calibration, views=(), held_out_residuals=(), suspects=(), misfit=misfit(calibration))
+    nothing = replace(
+        ordinary,
+        calibration=calibration,
+        views=(),
+        held_out_residuals=(),
+        suspects=(),
+        misfit=misfit(calibration),
+    )
     if plate.suits(nothing):
         to_svg(plate.draw(nothing), plate.name)
 
@@ -103,16 +116,29 @@ def test_a_displaced_corner_is_an_arrow_from_its_place_in_millimetres(shaped):
 
 def test_the_misfit_of_a_bent_board_is_drawn_with_its_scale_in_pixels(misshapen):
     texts = [text.get_text() for text in target_misfit(misshapen).axes[0].texts]
-    assert any(re.search(r"mm   \(in the plane, magnified \d+ times; 1 mm is \d\.\d px\)", text) for text in texts)
+    assert any(
+        re.search(r"mm   \(in the plane, magnified \d+ times; 1 mm is \d\.\d px\)", text) for text in texts
+    )
 
 
 def test_the_difference_between_a_lens_and_itself_is_nothing_and_another_is_mapped(ordinary, fisheye):
     camera = ordinary.calibration.camera
     other = replace(camera, lens=Brown(k1=-0.2))
-    assert lens_difference(camera, camera).axes[1].get_ylabel() == lens_difference(camera, other).axes[1].get_ylabel()
-    largest = [float(lens_difference(camera, one).axes[0].collections[0].get_array().max()) for one in (camera, other)]
+    assert (
+        lens_difference(camera, camera).axes[1].get_ylabel()
+        == lens_difference(camera, other).axes[1].get_ylabel()
+    )
+    largest = [
+        float(lens_difference(camera, one).axes[0].collections[0].get_array().max())
+        for one in (camera, other)
+    ]
     assert largest[0] < 1e-6 < 1.0 < largest[1]
-    to_svg(lens_difference(fisheye.calibration.camera, replace(fisheye.calibration.camera, lens=KannalaBrandt())), "difference")
+    to_svg(
+        lens_difference(
+            fisheye.calibration.camera, replace(fisheye.calibration.camera, lens=KannalaBrandt())
+        ),
+        "difference",
+    )
 
 
 def test_residuals_by_place_are_the_held_out_ones_where_there_are_any(ordinary, unheld):
@@ -122,7 +148,9 @@ def test_residuals_by_place_are_the_held_out_ones_where_there_are_any(ordinary, 
 
 def test_a_suspect_is_named_and_coloured_among_few_views_and_among_many(suspicious):
     few = residuals_by_view(suspicious).axes[0]
-    assert [label.get_text() for label in few.get_xticklabels() if to_hex(label.get_color()) == RED.lower()] == ["left04.jpg"]
+    assert [
+        label.get_text() for label in few.get_xticklabels() if to_hex(label.get_color()) == RED.lower()
+    ] == ["left04.jpg"]
     many = tuple(replace(view, image=f"{i}-{view.image}") for i in range(8) for view in suspicious.views)
     axes = residuals_by_view(replace(suspicious, views=many, suspects=(("5-left04.jpg", "odd"),))).axes[0]
     assert [text.get_text() for text in axes.texts] == ["5-left04.jpg"]
@@ -140,7 +168,9 @@ def test_radial_displacement_is_the_formulas_own():
     angles = np.linspace(0.0, 0.6, 7)
     radius, displacement = _along_angles(camera, angles)
     s = np.tan(angles)[:, None]
-    assert_allclose(radius, np.broadcast_to(500.0 * (s - 0.2 * s**3), radius.shape), atol=1e-9)  # px; rounding of 500 px
+    assert_allclose(
+        radius, np.broadcast_to(500.0 * (s - 0.2 * s**3), radius.shape), atol=1e-9
+    )  # px; rounding of 500 px
     assert_allclose(displacement, np.broadcast_to(-100.0 * s**3, displacement.shape), atol=1e-9)
 
 
@@ -177,7 +207,9 @@ def test_a_wide_photograph_is_shrunk_by_a_whole_factor_and_blue_stays_blue():
     assert_allclose(np.asarray(shown).reshape(-1, 3).mean(0), [0, 0, 250], atol=4)  # JPEG's own error
 
 
-@pytest.mark.parametrize("image", [np.zeros((4, 4)), np.zeros((4, 4, 4), np.uint8), np.zeros((0, 4), np.uint8)])
+@pytest.mark.parametrize(
+    "image", [np.zeros((4, 4)), np.zeros((4, 4, 4), np.uint8), np.zeros((0, 4), np.uint8)]
+)
 def test_what_is_no_8_bit_photograph_is_an_input_error(image):
     with pytest.raises(InputError, match="expected uint8"):
         photograph_uri(image)

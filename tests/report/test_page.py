@@ -14,14 +14,22 @@ import numpy as np
 import pytest
 
 from orthoscope.geometry.arrays import InputError
+from orthoscope.geometry.numbers import ABSENT
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.spline import Displacement, Lattice
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.report import page as page_module
-from orthoscope.report.numbers import ABSENT
 from orthoscope.report.page import report_page, write_report
 from orthoscope.report.shape import shape_rows
-from orthoscope.report.tables import candidate_rows, cards, lens_name, misfit_rows, parameters, view_rows, warnings
+from orthoscope.report.tables import (
+    candidate_rows,
+    cards,
+    lens_name,
+    misfit_rows,
+    parameters,
+    view_rows,
+    warnings,
+)
 
 KINDS = ("ordinary", "suspicious", "fisheye", "single", "unheld", "misshapen", "shaped")
 LOADS = {"src", "href", "xlink:href", "srcset", "data", "poster", "action"}
@@ -94,18 +102,31 @@ def test_every_number_that_does_not_exist_is_a_dash(pages, kind):
 
 def test_the_same_evaluation_gives_the_same_bytes_in_another_process_too(pages):
     program = (
-        "import sys; sys.path.insert(0, sys.argv[1]); import conftest as c\n"
-        "from orthoscope.geometry.target import chessboard; from orthoscope.report.page import report_page\n"
-        "made = c.evaluated(c.photographed(c.narrow_camera(), chessboard(9, 6, 0.025), 14, tilt=0.6, distance=0.45))\n"
-        "sys.stdout.buffer.write(report_page(made).encode())"
+        "import sys; sys.path.insert(0, sys.argv[1]); import conftest as c\nfrom"
+        " orthoscope.targets.detections import chessboard; from orthoscope.report.page import"
+        " report_page\nmade = c.evaluated(c.photographed(c.narrow_camera(), chessboard(9, 6, 0.025), 14,"
+        " tilt=0.6, distance=0.45))\nsys.stdout.buffer.write(report_page(made).encode())"
     )
     environment = {**os.environ, "PYTHONHASHSEED": "7"}
-    other = subprocess.run([sys.executable, "-c", program, os.path.dirname(__file__)], capture_output=True, check=True, env=environment)
+    other = subprocess.run(
+        [sys.executable, "-c", program, os.path.dirname(__file__)],
+        capture_output=True,
+        check=True,
+        env=environment,
+    )
     assert other.stdout.decode() == pages["ordinary"]
 
 
 def test_figures_neither_use_nor_change_matplotlibs_settings(ordinary, pages):
-    with mpl.rc_context({"font.size": 30.0, "axes.grid": True, "image.cmap": "jet", "svg.fonttype": "path", "lines.linewidth": 9.0}):
+    with mpl.rc_context(
+        {
+            "font.size": 30.0,
+            "axes.grid": True,
+            "image.cmap": "jet",
+            "svg.fonttype": "path",
+            "lines.linewidth": 9.0,
+        }
+    ):
         before = dict(mpl.rcParams)
         assert report_page(ordinary) == pages["ordinary"]
         assert dict(mpl.rcParams) == before
@@ -120,8 +141,14 @@ def test_names_and_reasons_of_photographs_set_aside_are_there_and_escaped(pages)
 def test_hostile_words_do_not_become_markup(ordinary, monkeypatch):
     monkeypatch.setattr(page_module, "_plates", lambda _: [])  # the words are not in the figures
     words = "<script>alert(1)</script>"
-    calibration = replace(ordinary.calibration, method=words, status=words, assumptions=(words,), settings={words: words})
-    page = report_page(replace(ordinary, calibration=calibration, verdict=words, warnings=(words,), suspects=((words, words),)))
+    calibration = replace(
+        ordinary.calibration, method=words, status=words, assumptions=(words,), settings={words: words}
+    )
+    page = report_page(
+        replace(
+            ordinary, calibration=calibration, verdict=words, warnings=(words,), suspects=((words, words),)
+        )
+    )
     assert "<script>" not in page
 
 
@@ -130,14 +157,24 @@ def test_the_page_says_the_verdict_the_suspects_the_assumptions_and_how_it_was_m
     assert every_evaluation["ordinary"].verdict in words["ordinary"]
     assert "its error is 7 times that of the others" in words["suspicious"]
     assert every_evaluation["single"].calibration.assumptions[0] in words["single"]
-    for said in ("fccm", "converged: the step no longer changes the parameters", "k1, k2, p1, p2, k3", "0.1.0", "per point"):
+    for said in (
+        "fccm",
+        "converged: the step no longer changes the parameters",
+        "k1, k2, p1, p2, k3",
+        "0.1.0",
+        "per point",
+    ):
         assert said in words["ordinary"]
 
 
 def test_a_warning_that_repeats_an_assumption_or_a_suspect_is_said_once(suspicious):
     image, reason = suspicious.suspects[0]
     calibration = replace(suspicious.calibration, assumptions=("square pixels",))
-    evaluation = replace(suspicious, calibration=calibration, warnings=("square pixels", f"{image} is odd: {reason}", "few views"))
+    evaluation = replace(
+        suspicious,
+        calibration=calibration,
+        warnings=("square pixels", f"{image} is odd: {reason}", "few views"),
+    )
     assert warnings(evaluation) == ["few views"]
 
 
@@ -145,7 +182,9 @@ def test_every_view_has_its_row_with_the_errors_of_its_own_name(suspicious):
     shuffled = replace(suspicious, views=suspicious.views[::-1])
     rows = view_rows(shuffled)
     assert [row.image for row in rows] == [view.image for view in suspicious.calibration.detections.views]
-    assert [row.rms for row in rows] == [f"{view.rms_px:.3f}" if view.rms_px < 1 else f"{view.rms_px:.3g}" for view in suspicious.views]
+    assert [row.rms for row in rows] == [
+        f"{view.rms_px:.3f}" if view.rms_px < 1 else f"{view.rms_px:.3g}" for view in suspicious.views
+    ]
     assert [row.number for row in rows if row.suspicion] == [4]
 
 
@@ -154,7 +193,9 @@ def test_a_parameter_is_shown_to_the_second_digit_of_its_deviation_or_as_fixed(o
     assert shown["fx"] == ("536.10", "0.31", "px")
     assert shown["skew"] == ("0", "fixed", "px")
     assert "tau_x" not in shown  # zero and not estimated: named below the table instead
-    assert {row.name: row.deviation for row in parameters(single.calibration)}["fy"] == "2.0"  # tied to fx, 4 is its variance
+    assert {row.name: row.deviation for row in parameters(single.calibration)}[
+        "fy"
+    ] == "2.0"  # tied to fx, 4 is its variance
     assert {row.deviation for row in parameters(unheld.calibration)} == {ABSENT}
 
 
@@ -167,7 +208,9 @@ def test_the_table_of_misfits_has_what_agrees_what_does_not_and_how_sure_that_is
     assert {row.f for row in misfit_rows(single)} == {ABSENT}
 
 
-def test_a_target_whose_shape_was_estimated_has_its_table_and_its_figure_and_a_flat_one_has_not(pages, shaped):
+def test_a_target_whose_shape_was_estimated_has_its_table_and_its_figure_and_a_flat_one_has_not(
+    pages, shaped
+):
     assert "Shape of the target" in pages["shaped"]
     assert "Shape of the target" not in pages["misshapen"]
     rows = dict(shape_rows(shaped.calibration))
@@ -178,7 +221,12 @@ def test_a_target_whose_shape_was_estimated_has_its_table_and_its_figure_and_a_f
 
 def test_what_was_tried_is_told_with_what_it_loses(pages, shaped):
     flat, free = candidate_rows(shaped.calibration)
-    assert (flat.target, flat.held_out, flat.standard_error, flat.loses) == ("flat", "0.310", "0.020", "0.090")
+    assert (flat.target, flat.held_out, flat.standard_error, flat.loses) == (
+        "flat",
+        "0.310",
+        "0.020",
+        "0.090",
+    )
     assert free.loses == "taken"
     assert "What was tried" in pages["shaped"]
     assert "Formula against free lens" in pages["shaped"]
@@ -255,5 +303,7 @@ def test_a_photograph_of_another_kind_is_an_input_error(ordinary, photographs):
 
 
 def test_the_page_module_alone_loads_neither_matplotlib_nor_jinja():
-    program = "import sys, orthoscope.report.page; sys.exit(bool({'matplotlib', 'jinja2'} & set(sys.modules)))"
+    program = (
+        "import sys, orthoscope.report.page; sys.exit(bool({'matplotlib', 'jinja2'} & set(sys.modules)))"
+    )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

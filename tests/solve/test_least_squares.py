@@ -1,13 +1,15 @@
-"""The solver: it finds minima, eliminates views without changing anything, says how it ended and what the data leave open."""
+"""The solver: it finds minima, eliminates views without changing anything, says how it ended and what the
+data leave open.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from blocks import Blocks, Place
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
+from helpers.blocks import Blocks, Place
 from orthoscope.geometry.arrays import InputError
 from orthoscope.solve.least_squares import NormalEquations, Options, Status, shared_covariance, solve
 from orthoscope.solve.losses import Cauchy, Huber, Linear
@@ -37,8 +39,11 @@ def test_it_reaches_the_minimum_that_scipy_reaches(shape, damp, seed):
         xtol=1e-15, ftol=1e-15, gtol=1e-15,
     )  # fmt: skip
     assert found.status is Status.CONVERGED
-    assert_allclose(found.cost, 2.0 * oracle.cost, rtol=1e-10)  # ten times the tolerance; scipy's cost is half the sum
-    # what a step would still gain is 1e-11 of the cost: 1e-5 of a deviation, and deviations are about noise / sqrt(rows) = 0.02
+    assert_allclose(
+        found.cost, 2.0 * oracle.cost, rtol=1e-10
+    )  # ten times the tolerance; scipy's cost is half the sum
+    # what a step would still gain is 1e-11 of the cost: 1e-5 of a deviation, and deviations are about noise /
+    # sqrt(rows) = 0.02
     assert_allclose(found.unknowns.flat(), oracle.x, atol=1e-6)
 
 
@@ -52,7 +57,9 @@ def test_robust_minima_are_those_of_scipy(loss):
         loss=type(loss).__name__.lower(), f_scale=loss.scale, xtol=1e-15, ftol=1e-15, gtol=1e-15,
     )  # fmt: skip
     assert found.status is Status.CONVERGED
-    assert_allclose(found.cost, 2.0 * oracle.cost, rtol=1e-9)  # reweighting converges linearly: the last gain is not all there is
+    assert_allclose(
+        found.cost, 2.0 * oracle.cost, rtol=1e-9
+    )  # reweighting converges linearly: the last gain is not all there is
 
 
 @for_every_shape
@@ -65,12 +72,16 @@ def test_trusting_its_last_step_it_saves_the_sums_there_and_ends_where_it_ends_o
     trusting = solve(problem, problem.start, options=Options(tolerance=1e-9, trusting=True))
     assert trusting.status is Status.CONVERGED
     assert len(formed) == trusting.steps  # the start's and one for each step but the last
-    assert linearise(trusting.unknowns, Linear()).cost <= lowest * (1.0 + 2e-9)  # twice the tolerance: the rate of shrinking drifts
+    assert linearise(trusting.unknowns, Linear()).cost <= lowest * (
+        1.0 + 2e-9
+    )  # twice the tolerance: the rate of shrinking drifts
     assert_allclose(trusting.cost, lowest, rtol=1e-5)  # as that step promised
 
 
 @for_every_shape
-@pytest.mark.parametrize(("damp", "damping"), [("diagonal", 1e-6), ("diagonal", 0.7), ("identity", 1e-6), ("identity", 5.0)])
+@pytest.mark.parametrize(
+    ("damp", "damping"), [("diagonal", 1e-6), ("diagonal", 0.7), ("identity", 1e-6), ("identity", 5.0)]
+)
 def test_eliminating_the_views_gives_the_dense_step(shape, damp, damping):
     problem = Blocks(*shape, rows=20, bend=0.0)  # linear, so the first step is always taken
     one = solve(problem, problem.start, options=Options(max_steps=1, damp=damp, damping=damping))
@@ -78,7 +89,9 @@ def test_eliminating_the_views_gives_the_dense_step(shape, damp, damping):
     H = J.T @ J
     weights = np.diag(H) if damp == "diagonal" else np.ones(len(H))
     step = -np.linalg.solve(H + damping * np.diag(weights), J.T @ e)
-    assert_allclose(one.unknowns.flat() - problem.start.flat(), step, atol=1e-11)  # rounding times a condition of at most 1e3
+    assert_allclose(
+        one.unknowns.flat() - problem.start.flat(), step, atol=1e-11
+    )  # rounding times a condition of at most 1e3
 
 
 def test_a_linear_problem_takes_one_step():
@@ -98,7 +111,9 @@ def test_without_noise_it_finds_the_truth():
     problem = Blocks(4, 3, 6, rows=20, noise=0.0)
     found = solve(problem, problem.start)
     assert found.status is Status.CONVERGED
-    assert_allclose(found.unknowns.flat(), problem.truth.flat(), atol=1e-8)  # stops where a step gains less than 1e-18 = (1e-9)^2
+    assert_allclose(
+        found.unknowns.flat(), problem.truth.flat(), atol=1e-8
+    )  # stops where a step gains less than 1e-18 = (1e-9)^2
 
 
 def test_unknowns_that_nothing_depends_on_do_not_disturb_the_others():
@@ -110,7 +125,9 @@ def test_unknowns_that_nothing_depends_on_do_not_disturb_the_others():
     found = solve(problem, start)
     assert found.status is Status.CONVERGED
     assert_allclose(found.unknowns.shared[1], 3.0)
-    assert_allclose(found.unknowns.shared[0] + found.unknowns.shared[-1], reference.shared[0], atol=1e-6)  # as in the test against scipy
+    assert_allclose(
+        found.unknowns.shared[0] + found.unknowns.shared[-1], reference.shared[0], atol=1e-6
+    )  # as in the test against scipy
     assert_allclose(found.unknowns.shared[2:-1], reference.shared[1:], atol=1e-6)
 
 
@@ -127,13 +144,22 @@ def test_cauchy_resists_gross_errors():
 
 
 class Valley:
-    """x + y = 1 against x - y = 500, seen through 1e-4, beside a residual of 1 that nothing moves: y - x hardly matters, but it does."""
+    """x + y = 1 against x - y = 500, seen through 1e-4, beside a residual of 1 that nothing moves: y - x
+    hardly matters, but it does.
+    """
 
     J, b = np.array([[1.0, 1.0], [1e-4, -1e-4], [0.0, 0.0]]), np.array([1.0, 0.05, 1.0])
 
     def linearise(self, unknowns, loss):
         e = self.J @ unknowns - self.b
-        return NormalEquations(float(e @ e), self.J.T @ self.J, self.J.T @ e, np.empty((0, 2, 0)), np.empty((0, 0, 0)), np.empty((0, 0)))
+        return NormalEquations(
+            float(e @ e),
+            self.J.T @ self.J,
+            self.J.T @ e,
+            np.empty((0, 2, 0)),
+            np.empty((0, 0, 0)),
+            np.empty((0, 0)),
+        )
 
     def move(self, unknowns, shared, views):
         return unknowns + shared
@@ -142,7 +168,9 @@ class Valley:
 def test_it_does_not_trust_a_promise_that_only_damping_made_small():
     found = solve(Valley(), np.zeros(2), options=Options(tolerance=1e-6, trusting=True))
     assert found.status is Status.CONVERGED
-    assert_allclose(found.unknowns, [250.5, -249.5], rtol=0.02)  # 1e-6 of a cost of 1, by the slope of 1e-4, is 10 on y - x
+    assert_allclose(
+        found.unknowns, [250.5, -249.5], rtol=0.02
+    )  # 1e-6 of a cost of 1, by the slope of 1e-4, is 10 on y - x
 
 
 class Cliff:
@@ -152,14 +180,18 @@ class Cliff:
         e = unknowns - 2.0
         cost = float(e * e) if unknowns <= 1.0 else float("nan")
         none = np.empty((0, 1, 0))
-        return NormalEquations(cost, np.ones((1, 1)), np.array([e]), none, np.empty((0, 0, 0)), np.empty((0, 0)))
+        return NormalEquations(
+            cost, np.ones((1, 1)), np.array([e]), none, np.empty((0, 0, 0)), np.empty((0, 0))
+        )
 
     def move(self, unknowns, shared, views):
         return unknowns + float(shared[0])
 
 
 def test_at_the_end_of_a_domain_it_is_stuck_and_does_not_claim_a_minimum():
-    found = solve(Cliff(), 0.0, options=Options(max_steps=200))  # each step that is taken loosens the damping, the next falls over the edge
+    found = solve(
+        Cliff(), 0.0, options=Options(max_steps=200)
+    )  # each step that is taken loosens the damping, the next falls over the edge
     assert found.status is Status.STUCK
     assert_allclose(found.unknowns, 1.0, atol=1e-9)  # where a step promises 1e-11 of the cost of 1
 
@@ -177,12 +209,16 @@ def test_at_the_step_limit_it_says_so():
 
 def test_every_status_is_a_sentence():
     assert all(status.value[0].islower() and not status.value.endswith(".") for status in Status)
-    assert {Status.CONVERGED, Status.STUCK, Status.NO_COST, Status.STEP_LIMIT} == set(Status)  # each is reached by a test above
+    assert {Status.CONVERGED, Status.STUCK, Status.NO_COST, Status.STEP_LIMIT} == set(
+        Status
+    )  # each is reached by a test above
 
 
 def test_progress_hears_of_falling_costs():
     problem, heard = Blocks(4, 3, 6, rows=20), []
-    found = solve(problem, problem.start, options=Options(progress=lambda step, cost: heard.append((step, cost))))
+    found = solve(
+        problem, problem.start, options=Options(progress=lambda step, cost: heard.append((step, cost)))
+    )
     steps, costs = zip(*heard, strict=True)
     assert list(steps) == sorted(set(steps))
     assert list(costs) == sorted(costs, reverse=True)
@@ -214,7 +250,9 @@ def test_the_covariance_is_the_scatter_over_repeated_measurements():
     scatter, told = np.cov(np.array(found).T), np.mean(told, axis=0)
     deviations = np.sqrt(np.diag(told))
     # 400 draws tell a variance to sqrt(2 / 400) = 7 %, a correlation to 5 %: three of these
-    assert_allclose(scatter / np.outer(deviations, deviations), told / np.outer(deviations, deviations), atol=0.21)
+    assert_allclose(
+        scatter / np.outer(deviations, deviations), told / np.outer(deviations, deviations), atol=0.21
+    )
 
 
 def test_the_covariance_is_infinite_for_unknowns_that_the_data_leave_open_and_only_for_them():
@@ -223,7 +261,9 @@ def test_the_covariance_is_infinite_for_unknowns_that_the_data_leave_open_and_on
     reference = shared_covariance(found.sums, len(problem.b))
     problem.S = np.concatenate([problem.S, problem.S[:, :1], np.zeros((len(problem.S), 1))], axis=1)
     doubled = Place(np.concatenate([found.unknowns.shared, [0.0, 0.0]]), found.unknowns.views)
-    covariance = shared_covariance(problem.linearise(doubled, Linear()), len(problem.b) + 2)  # as many to spare as before
+    covariance = shared_covariance(
+        problem.linearise(doubled, Linear()), len(problem.b) + 2
+    )  # as many to spare as before
     is_open = np.array([True, False, False, True, True])
     assert np.isinf(covariance[is_open]).all()
     assert np.isinf(covariance[:, is_open]).all()

@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose
 from orthoscope.geometry.arrays import InputError
 from orthoscope.solve.losses import LOSSES, Cauchy, Huber
 
-for_every_loss = pytest.mark.parametrize("loss", [kind(scale) for kind in LOSSES.values() for scale in (0.3, 1.0, 40.0)], ids=repr)
+for_every_loss = pytest.mark.parametrize(
+    "loss", [kind(scale) for kind in LOSSES.values() for scale in (0.3, 1.0, 40.0)], ids=repr
+)
 
 
 def away_from_the_kink(scale: float) -> np.ndarray:
@@ -23,7 +25,9 @@ def test_the_weight_is_the_derivative_of_the_cost(loss):
     h = 1e-5 * q
     slope = (loss.cost(q + h) - loss.cost(q - h)) / (2 * h)
     weight = loss.weight(q)
-    assert_allclose(np.ones_like(q) if weight is None else weight, slope, rtol=1e-6)  # of the differences: h^2 and 1e-16 / h
+    assert_allclose(
+        np.ones_like(q) if weight is None else weight, slope, rtol=1e-6
+    )  # of the differences: h^2 and 1e-16 / h
 
 
 @for_every_loss

@@ -1,7 +1,8 @@
 """The command line: each verb one arrow of the flow, in a file of its own.
 
-Floor 8, the only one that prints.  Numbers go to stdout, progress and remarks to stderr.  Exit 0: done; 1: the data cannot answer; 2: the
-command or what it was given is wrong.  Nothing but click is imported here and at the head of a verb, so that `--help` is instant.
+Numbers go to stdout, progress and remarks to stderr. Exit 0: done; 1: the data cannot answer; 2: the command
+or what it was given is wrong. Nothing but click is imported here and at the head of a verb, so that `--help`
+is instant.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ Example:
 """
 
 
-@click.group(epilog=EXAMPLE, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(
+    epilog=EXAMPLE, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110}
+)
 @click.version_option(__version__, prog_name="orthoscope")
 def verbs() -> None:
     """Photographs of a flat target in, a camera that can be trusted out."""

@@ -1,7 +1,4 @@
-"""`orthoscope calibrate`: photographs, or corners found before, to a camera with its report.
-
-Floor 8.
-"""
+"""`orthoscope calibrate`: photographs, or corners found before, to a camera with its report."""
 
 from __future__ import annotations
 
@@ -48,12 +45,20 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @options.jobs
 @options.cluster
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("camera"), show_default=True, help="Folder to write."
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("camera"),
+    show_default=True,
+    help="Folder to write.",
 )
 @click.option(
     "--export",
     metavar="TOOL",
-    help="Also write the camera for opencv, ros or kalibr, into OUT/camera-TOOL.yaml; --lens auto then takes a lens that the tool has.",
+    help=(
+        "Also write the camera for opencv, ros or kalibr, into OUT/camera-TOOL.yaml; --lens auto then takes a"
+        " lens that the tool has."
+    ),
 )
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
 @options.keep
@@ -86,12 +91,12 @@ def calibrate_into(
 ) -> Any:
     """The main job; prints the summary and returns the evaluation."""
     from orthoscope.cli.executors import processes, threads
+    from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
     from orthoscope.evaluation.evaluate import evaluate
-    from orthoscope.io.files import check_folder
-    from orthoscope.io.inputs import detections_from
-    from orthoscope.io.own_json import save
+    from orthoscope.files.whole_files import check_folder
+    from orthoscope.formats.own.json import save
     from orthoscope.methods import calibrate as run
     from orthoscope.methods import settings_of
 
@@ -101,11 +106,13 @@ def calibrate_into(
     given = {"lens": lens, "skew": skew, "target": shape, "loss": loss, "among": among or None}
     given = {name: value for name, value in given.items() if value is not None}
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
-        detections, files = detections_from(photos, target, image_size=image_size, executor=executor, progress=progress)
+        detections, files = detections_from(
+            photos, target, image_size=image_size, executor=executor, progress=progress
+        )
     save(detections, out / "detections.json")
     written = [out / "detections.json"]
     with bar("calibrating") as progress:
-        told = {"rehearsing": progress} if "rehearsing" in settings_of(method) else {}
+        told = {"judging": progress} if "judging" in settings_of(method) else {}
         calibration = run(detections, method=method, **given, **told)
     with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
         evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
@@ -128,8 +135,8 @@ def _lenses_of(tool: str | None) -> tuple[str, ...]:
     """The lenses that a tool has; none where no tool is named."""
     if tool is None:
         return ()
+    from orthoscope.formats.export import EXPORTERS
     from orthoscope.geometry.arrays import InputError
-    from orthoscope.io.export import EXPORTERS
 
     if tool not in EXPORTERS:
         raise InputError(f"no file for {tool!r} can be written; expected one of {', '.join(EXPORTERS)}.")
@@ -137,7 +144,7 @@ def _lenses_of(tool: str | None) -> tuple[str, ...]:
 
 
 def _write_for(tool: str, calibration: Any, out: Path) -> Path:
-    from orthoscope.io.export import export, exportable
+    from orthoscope.formats.export import export, exportable
 
     path = out / f"camera-{tool}.yaml"
     export(exportable(calibration.camera, tool, made_from=calibration).camera, path, tool)
@@ -145,22 +152,27 @@ def _write_for(tool: str, calibration: Any, out: Path) -> Path:
 
 
 def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str) -> Path:
-    from orthoscope.io.undistort import before_and_after
     from orthoscope.report.page import write_report
+    from orthoscope.straight.undistort import before_and_after
 
-    write_report(evaluation, out / "report.html", photograph=before_and_after(evaluation.calibration, files, keep=keep))
+    write_report(
+        evaluation, out / "report.html", photograph=before_and_after(evaluation.calibration, files, keep=keep)
+    )
     return out / "report.html"
 
 
-def _write_straight(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None) -> Path:
+def _write_straight(
+    evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None
+) -> Path:
     from orthoscope.cli.undistort import straighten
+    from orthoscope.formats.own.json import save
     from orthoscope.geometry.arrays import InputError
-    from orthoscope.io.own_json import save
-    from orthoscope.io.undistort import straight_camera
+    from orthoscope.straight.undistort import straight_camera
 
     if not files:
         raise InputError(
-            "--undistort needs the photographs; these were corners found before. Use `orthoscope undistort` with the photographs."
+            "--undistort needs the photographs; these were corners found before. Use `orthoscope undistort`"
+            " with the photographs."
         )
     calibration = evaluation.calibration
     paths = [files[view.image] for view in calibration.detections.views]

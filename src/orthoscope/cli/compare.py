@@ -1,7 +1,4 @@
-"""`orthoscope compare`: methods and lenses side by side, on the same photographs.
-
-The floor of the command line.
-"""
+"""`orthoscope compare`: methods and lenses side by side, on the same photographs."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ import click
 from orthoscope.cli import options
 
 if TYPE_CHECKING:
-    from orthoscope.evaluation.compare import Comparison, Standing
+    from orthoscope.evaluation.comparison.compare import Comparison, Standing
 
 __all__ = ["compare"]
 
@@ -47,14 +44,21 @@ HEADINGS = ("", "held out (px)", "loses (px)", "NCE", "used (px)", "parameters",
     "names",
     multiple=True,
     metavar="WHO",
-    help="Method and lens to compare, once for each; by default every method, decoupled also with the target's shape free and "
-    "flat, fccm also with rational.",
+    help=(
+        "Method and lens to compare, once for each; by default every method, decoupled also with the target's"
+        " shape free and flat, fccm also with rational."
+    ),
 )
 @options.folds
 @options.jobs
 @options.cluster
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True, help="Folder to write."
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("comparison"),
+    show_default=True,
+    help="Folder to write.",
 )
 @options.as_json
 def compare(
@@ -70,22 +74,28 @@ def compare(
 ) -> None:
     """Compare methods and lenses by their error on photographs that they have not seen."""
     from orthoscope.cli.executors import processes, threads
+    from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import to_json
-    from orthoscope.evaluation.compare import compare as judge
-    from orthoscope.evaluation.entrants import USUAL, parse_entrant
-    from orthoscope.io.files import check_folder, write_text
-    from orthoscope.io.inputs import detections_from
+    from orthoscope.evaluation.comparison.compare import compare as judge
+    from orthoscope.evaluation.comparison.entry import USUAL, parse_entry
+    from orthoscope.files.whole_files import check_folder, write_text
     from orthoscope.report.comparison import comparison_page, comparison_svg
 
     check_folder(out)
-    entrants = [parse_entrant(name) for name in names or USUAL]
+    entries = [parse_entry(name) for name in names or USUAL]
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
-        detections, _ = detections_from(photos, target, image_size=image_size, executor=executor, progress=progress)
+        detections, _ = detections_from(
+            photos, target, image_size=image_size, executor=executor, progress=progress
+        )
     with processes(jobs or 1, cluster) as executor, bar("comparing") as progress:
-        comparison = judge(detections, entrants, folds=folds, executor=executor, progress=progress)
+        comparison = judge(detections, entries, folds=folds, executor=executor, progress=progress)
     numbers = to_json(_numbers(comparison))
-    texts = {"compare.json": numbers + "\n", "compare.html": comparison_page(comparison), "compare.svg": comparison_svg(comparison)}
+    texts = {
+        "compare.json": numbers + "\n",
+        "compare.html": comparison_page(comparison),
+        "compare.svg": comparison_svg(comparison),
+    }
     for name, text in texts.items():
         write_text(out / name, text)
     written = "wrote      " + ", ".join(str(out / name) for name in texts)
@@ -94,16 +104,22 @@ def compare(
 
 def _lines(comparison: Comparison) -> list[str]:
     """The views, the table, who could not be judged and why, what follows."""
-    from orthoscope.evaluation.conclusions import conclusions
+    from orthoscope.evaluation.comparison.conclusions import conclusions
 
     used = comparison.detections
     left_out = f", {len(used.outliers)} left out" if used.outliers else ""
     lines = [
-        f"views      {len(used.views)} used, {len(used.set_aside)} set aside; {used.corners} corners{left_out}; "
-        f"{comparison.folds} folds held out",
+        (
+            f"views      {len(used.views)} used, {len(used.set_aside)} set aside; {used.corners}"
+            f" corners{left_out}; {comparison.folds} folds held out"
+        ),
         *_table(comparison),
     ]
-    lines += [f"cannot     {standing.entrant.name}: {standing.failure}" for standing in comparison.standings if standing.failure]
+    lines += [
+        f"cannot     {standing.entry.name}: {standing.failure}"
+        for standing in comparison.standings
+        if standing.failure
+    ]
     first, *others = conclusions(comparison)
     return [*lines, f"verdict    {first}", *(f"           {sentence}" for sentence in others)]
 
@@ -115,12 +131,25 @@ def _table(comparison: Comparison) -> list[str]:
     cells: list[tuple[str, ...]] = [HEADINGS]
     for row in rows(comparison):
         loses = row.verdict if row.verdict == "best" else row.loses
-        cells.append((row.name, row.held_out, loses, row.nce, row.used, row.parameters, row.seconds, row.lens, row.shape))
+        cells.append(
+            (
+                row.name,
+                row.held_out,
+                loses,
+                row.nce,
+                row.used,
+                row.parameters,
+                row.seconds,
+                row.lens,
+                row.shape,
+            )
+        )
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     words = (0, 7, 8)
     return [
         "  ".join(
-            cell.ljust(width) if i in words else cell.rjust(width) for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+            cell.ljust(width) if i in words else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
         ).rstrip()
         for row in cells
     ]
@@ -128,7 +157,7 @@ def _table(comparison: Comparison) -> list[str]:
 
 def _numbers(comparison: Comparison) -> dict[str, Any]:
     """All of it as one object for machines; what is not known is None."""
-    from orthoscope.evaluation.conclusions import conclusions
+    from orthoscope.evaluation.comparison.conclusions import conclusions
     from orthoscope.version import __version__
 
     used = comparison.detections
@@ -149,9 +178,9 @@ def _numbers(comparison: Comparison) -> dict[str, Any]:
 def _standing(standing: Standing, comparison: Comparison) -> dict[str, Any]:
     corners = [len(view.ids) for view in comparison.detections.views]
     return {
-        "name": standing.entrant.name,
-        "method": standing.entrant.method,
-        "settings": dict(standing.entrant.settings),
+        "name": standing.entry.name,
+        "method": standing.entry.method,
+        "settings": dict(standing.entry.settings),
         "held_out_rms_px": standing.held_out_px,
         "held_out_error_px": standing.error_px,
         "loses_px": standing.loses_px,
@@ -163,5 +192,7 @@ def _standing(standing: Standing, comparison: Comparison) -> dict[str, Any]:
         "lens": standing.lens or None,
         "target": standing.shape or None,
         "failure": standing.failure or None,
-        "views_held_out_rms_px": [float((total / n) ** 0.5) for total, n in zip(standing.squares, corners, strict=True)],
+        "views_held_out_rms_px": [
+            float((total / n) ** 0.5) for total, n in zip(standing.squares, corners, strict=True)
+        ],
     }

@@ -1,7 +1,4 @@
-"""`orthoscope detect`: photographs to detections.json.
-
-Floor 8.
-"""
+"""`orthoscope detect`: photographs to detections.json."""
 
 from __future__ import annotations
 
@@ -47,24 +44,38 @@ def detect(
 ) -> None:
     """Find the target's corners in photographs (or turn a corners.vnl table into detections.json)."""
     from orthoscope.cli.executors import threads
+    from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import to_json
-    from orthoscope.io.files import check_folder
-    from orthoscope.io.inputs import detections_from
-    from orthoscope.io.own_json import save
+    from orthoscope.files.whole_files import check_folder
+    from orthoscope.formats.own.json import save
 
     check_folder(out.parent)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
-        detections, _ = detections_from(photos, target, image_size=image_size, executor=executor, progress=progress)
+        detections, _ = detections_from(
+            photos, target, image_size=image_size, executor=executor, progress=progress
+        )
     save(detections, out)
     width, height = detections.image_size
     used, aside = detections.views, detections.set_aside
     if as_json:
         views = [{"name": view.image, "corners": len(view.ids)} for view in used]
         rejected = [{"name": entry.image, "reason": entry.reason} for entry in aside]
-        click.echo(to_json({"image_size": [width, height], "corners": detections.corners, "views": views, "views_rejected": rejected}))
+        click.echo(
+            to_json(
+                {
+                    "image_size": [width, height],
+                    "corners": detections.corners,
+                    "views": views,
+                    "views_rejected": rejected,
+                }
+            )
+        )
         return
-    click.echo(f"views      {len(used)} of {len(used) + len(aside)} photographs, {detections.corners} corners, {width}x{height}")
+    click.echo(
+        f"views      {len(used)} of {len(used) + len(aside)} photographs, {detections.corners} corners,"
+        f" {width}x{height}"
+    )
     for entry in aside:
         click.echo(f"           {entry.image}: {entry.reason}")
     click.echo(f"wrote      {out}")

@@ -1,7 +1,4 @@
-"""`orthoscope evaluate`: a calibration's verdict, on its own views or on others.
-
-Floor 8.
-"""
+"""`orthoscope evaluate`: a calibration's verdict, on its own views or on others."""
 
 from __future__ import annotations
 
@@ -30,7 +27,11 @@ with --target they show that one, taken as it is said to be.
 @click.command(epilog=EXAMPLE)
 @options.calibration_file
 @click.option(
-    "--on", "others", multiple=True, metavar="PHOTOS", help="Photographs or corners that were not used: only their poses are fitted."
+    "--on",
+    "others",
+    multiple=True,
+    metavar="PHOTOS",
+    help="Photographs or corners that were not used: only their poses are fitted.",
 )
 @options.target
 @options.image_size
@@ -50,30 +51,43 @@ def evaluate(
 ) -> None:
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
     from orthoscope.cli.executors import processes, threads
+    from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
     from orthoscope.evaluation.evaluate import evaluate as judge
     from orthoscope.evaluation.evaluate import evaluate_on
-    from orthoscope.io.inputs import detections_from
-    from orthoscope.io.own_json import load_calibration
+    from orthoscope.formats.own.json import load_calibration
 
     loaded = load_calibration(calibration)
     if not others:
         with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
             evaluation = judge(loaded, folds=folds, executor=executor, progress=progress)
-        click.echo(to_json(evaluation_numbers(evaluation)) if as_json else "\n".join(evaluation_lines(evaluation)))
+        click.echo(
+            to_json(evaluation_numbers(evaluation)) if as_json else "\n".join(evaluation_lines(evaluation))
+        )
         return
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         board = target or loaded.detections.target
-        detections, _ = detections_from(others, board, image_size=image_size, executor=executor, progress=progress)
+        detections, _ = detections_from(
+            others, board, image_size=image_size, executor=executor, progress=progress
+        )
     shape = None if target else loaded.target_shape  # another board has another shape
     test = evaluate_on(loaded.camera, detections, shape=shape)
     if as_json:
         rejected = [{"name": entry.image, "reason": entry.reason} for entry in test.detections.set_aside]
-        views = [{"name": view.image, "rms_px": rms} for view, rms in zip(test.detections.views, test.view_rms_px, strict=True)]
+        views = [
+            {"name": view.image, "rms_px": rms}
+            for view, rms in zip(test.detections.views, test.view_rms_px, strict=True)
+        ]
         click.echo(
             to_json(
-                {"rms_px": test.rms_px, "nce": test.nce, "corners": test.detections.corners, "views": views, "views_rejected": rejected}
+                {
+                    "rms_px": test.rms_px,
+                    "nce": test.nce,
+                    "corners": test.detections.corners,
+                    "views": views,
+                    "views_rejected": rejected,
+                }
             )
         )
         return

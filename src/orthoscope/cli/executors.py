@@ -1,8 +1,9 @@
-"""Where many photographs or trials are worked on at once: threads or processes here, or the workers of a Dask cluster.
+"""Where many photographs or trials are worked on at once: threads or processes here, or the workers of a Dask
+cluster.
 
-The floor of the command line.  Each is a `concurrent.futures.Executor` that is handed down; what is left to do when a verb is stopped, by
-Ctrl-C or by SIGTERM, is dropped, and nobody stays behind: threads finish the photograph that they are at, processes go at once, even
-where their parent was killed.
+Each is a `concurrent.futures.Executor` that is handed down; what is left to do when a verb is stopped, by
+Ctrl-C or by SIGTERM, is dropped, and nobody stays behind: threads finish the photograph that they are at,
+processes go at once, even where their parent was killed.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ PATIENCE = 10  # seconds in which a scheduler has to answer
 
 @contextmanager
 def threads(jobs: int | None, address: str | None = None) -> Iterator[Executor]:
-    """For work that OpenCV does, which lets other threads run: so many of them, as many as there are cores, or a cluster."""
+    """For work that OpenCV does, which lets other threads run: so many of them, as many as there are cores,
+    or a cluster.
+    """
     from concurrent.futures import ThreadPoolExecutor
 
     with cluster(address) if address else _here(ThreadPoolExecutor(jobs or os.cpu_count())) as executor:
@@ -31,7 +34,9 @@ def threads(jobs: int | None, address: str | None = None) -> Iterator[Executor]:
 
 @contextmanager
 def processes(jobs: int | None, address: str | None = None) -> Iterator[Executor | None]:
-    """For work that Python does: so many fresh processes, as many as there are cores, or a cluster; None for one job, which needs none."""
+    """For work that Python does: so many fresh processes, as many as there are cores, or a cluster; None for
+    one job, which needs none.
+    """
     jobs = jobs or os.cpu_count() or 1
     if address:
         with cluster(address) as executor:
@@ -42,13 +47,16 @@ def processes(jobs: int | None, address: str | None = None) -> Iterator[Executor
         import multiprocessing
         from concurrent.futures import ProcessPoolExecutor
 
-        with _here(ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _serve), then=_end_children) as executor:
+        with _here(
+            ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _serve), then=_end_children
+        ) as executor:
             yield executor
 
 
 @contextmanager
 def cluster(address: str) -> Iterator[Executor]:
-    """The workers of a running Dask scheduler, such as tcp://192.168.1.5:8786; one that dies has its work done by the others.
+    """The workers of a running Dask scheduler, such as tcp://192.168.1.5:8786; one that dies has its work
+    done by the others.
 
     Raises InputError where `distributed` is not installed or nobody answers.
     """
@@ -58,13 +66,15 @@ def cluster(address: str) -> Iterator[Executor]:
         from distributed import Client
     except ImportError as error:
         raise InputError(
-            "--cluster needs Dask, which is not installed; say pip install 'orthoscope[cluster]', or drop --cluster."
+            "--cluster needs Dask, which is not installed; say pip install 'orthoscope[cluster]', or drop"
+            " --cluster."
         ) from error
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
-            f"no Dask scheduler answers at {address!r}; expected one such as tcp://192.168.1.5:8786. Start it first."
+            f"no Dask scheduler answers at {address!r}; expected one such as tcp://192.168.1.5:8786. Start it"
+            " first."
         ) from error
     with client, _stopped_by_sigterm():
         executor = client.get_executor(pure=False)
@@ -77,7 +87,9 @@ def cluster(address: str) -> Iterator[Executor]:
 
 @contextmanager
 def single_threaded() -> Iterator[None]:
-    """Lets numpy compute with one thread where it is not loaded yet: sums then do not depend on the machine's cores."""
+    """Lets numpy compute with one thread where it is not loaded yet: sums then do not depend on the machine's
+    cores.
+    """
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
@@ -92,7 +104,9 @@ def single_threaded() -> Iterator[None]:
 
 @contextmanager
 def _here(executor: Executor, *, then: Callable[[], None] = lambda: None) -> Iterator[Executor]:
-    """An executor of this machine, whose waiting work is dropped when the block is left by an error or a stop, which `then` follows."""
+    """An executor of this machine, whose waiting work is dropped when the block is left by an error or a
+    stop, which `then` follows.
+    """
     with _stopped_by_sigterm(), executor:
         try:
             yield executor

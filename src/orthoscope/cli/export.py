@@ -1,7 +1,4 @@
-"""`orthoscope export`: a camera to the file of the tool that is used next.
-
-Floor 8.
-"""
+"""`orthoscope export`: a camera to the file of the tool that is used next."""
 
 from __future__ import annotations
 
@@ -29,14 +26,19 @@ the line above says what it costs. `orthoscope calibrate --export TOOL` chooses 
 @options.calibration_file
 @click.option("--to", "tool", required=True, metavar="TOOL", help="opencv, ros or kalibr.")
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("camera.yaml"), show_default=True, help="File to write."
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path("camera.yaml"),
+    show_default=True,
+    help="File to write.",
 )
 def export(calibration: Path, tool: str, out: Path) -> None:
     """Write a camera for another tool."""
-    from orthoscope.io.export import export as write
-    from orthoscope.io.export import exportable
-    from orthoscope.io.own_json import load, load_camera
-    from orthoscope.methods.calibration import Calibration
+    from orthoscope.fitting.calibration import Calibration
+    from orthoscope.formats.export import export as write
+    from orthoscope.formats.export import exportable
+    from orthoscope.formats.own.json import load, load_camera
     from orthoscope.models.lenses import lens_name
 
     thing = load(calibration)
@@ -45,7 +47,7 @@ def export(calibration: Path, tool: str, out: Path) -> None:
     write(known.camera, out, tool)
     if known.camera is not camera:
         click.echo(
-            f"lens       {lens_name(known.camera.lens)} instead of the free lens: {known.apart_px:.2g} px apart on average "
-            f"{known.where}, {known.farthest_px:.2g} px at most"
+            f"lens       {lens_name(known.camera.lens)} instead of the free lens: {known.apart_px:.2g} px"
+            f" apart on average {known.where}, {known.farthest_px:.2g} px at most"
         )
     click.echo(f"wrote      {out}")

@@ -1,7 +1,4 @@
-"""Options that several verbs share, each said once.
-
-Floor 8.
-"""
+"""Options that several verbs share, each said once."""
 
 from __future__ import annotations
 
@@ -34,7 +31,9 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 class _Size(click.ParamType):
     name = "WxH"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
         if isinstance(value, tuple):
             return value
         try:
@@ -50,52 +49,76 @@ photos: Decorator = click.argument("photos", nargs=-1, required=True, metavar="P
 target: Decorator = click.option(
     "--target",
     metavar="SPEC",
-    help="What was photographed: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g. chessboard:9x6:25mm.",
+    help=(
+        "What was photographed: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g."
+        " chessboard:9x6:25mm."
+    ),
 )
 image_size: Decorator = click.option(
-    "--image-size", type=_Size(), help="Size of the photographs; needed with a corners.vnl table or a simulated lens only."
+    "--image-size",
+    type=_Size(),
+    help="Size of the photographs; needed with a corners.vnl table or a simulated lens only.",
 )
 lens: Decorator = click.option(
     "--lens",
     default="auto",
     show_default=True,
     metavar="NAME",
-    help="free (a formula and a spline on top), brown, rational, kannala_brandt, division, fov, pfet, fet; brown:k1,k2 frees just these; "
-    "auto takes what the method takes: decoupled the free lens, fccm brown, or kannala_brandt for wide views.",
+    help=(
+        "free (a formula and a spline on top), brown, rational, kannala_brandt, division, fov, pfet, fet;"
+        " brown:k1,k2 frees just these; auto takes what the method takes: decoupled the free lens, fccm"
+        " brown, or kannala_brandt for wide views."
+    ),
 )
 method: Decorator = click.option(
     "--method",
     default="decoupled",
     show_default=True,
     metavar="NAME",
-    help="How to calibrate: decoupled (target's shape and a free lens first), fccm (jointly, the target flat), nmldc (straight lines "
-    "first) or mldc (the paper's).",
+    help=(
+        "How to calibrate: decoupled (target's shape and a free lens first), fccm (jointly, the target flat),"
+        " nmldc (straight lines first) or mldc (the paper's)."
+    ),
 )
 shape: Decorator = click.option(
     "--shape",
     metavar="KIND",
-    help="The target's shape, for decoupled: flat (as it is said to be), smooth (stretched, bent) or free (each corner by itself); by "
-    "default what foresees best.",
+    help=(
+        "The target's shape, for decoupled: flat (as it is said to be), smooth (stretched, bent) or free"
+        " (each corner by itself); by default what foresees best."
+    ),
 )
 skew: Decorator = click.option("--skew", is_flag=True, help="Let the pixel axes be oblique.")
 loss: Decorator = click.option(
     "--loss",
     metavar="NAME",
-    help="For fccm, nmldc and mldc: linear, huber or cauchy; the last two forgive gross errors beyond 1 px. decoupled finds its own.",
+    help=(
+        "For fccm, nmldc and mldc: linear, huber or cauchy; the last two forgive gross errors beyond 1 px."
+        " decoupled finds its own."
+    ),
 )
 folds: Decorator = click.option(
-    "--folds", default=5, show_default=True, type=click.IntRange(2), help="Parts that the views are held out in."
+    "--folds",
+    default=5,
+    show_default=True,
+    type=click.IntRange(2),
+    help="Parts that the views are held out in.",
 )
 jobs: Decorator = click.option(
     "--jobs",
     type=click.IntRange(1),
-    help="How much is done at the same time: photographs, by default as many as there are cores; folds, by default one.",
+    help=(
+        "How much is done at the same time: photographs, by default as many as there are cores; folds, by"
+        " default one."
+    ),
 )
 cluster: Decorator = click.option(
     "--cluster",
     metavar="ADDRESS",
-    help="Instead of --jobs: the Dask scheduler, such as tcp://192.168.1.5:8786, whose workers see the same files "
-    "(pip install 'orthoscope[cluster]').",
+    help=(
+        "Instead of --jobs: the Dask scheduler, such as tcp://192.168.1.5:8786, whose workers see the same"
+        " files (pip install 'orthoscope[cluster]')."
+    ),
 )
 keep: Decorator = click.option(
     "--keep",
@@ -104,5 +127,9 @@ keep: Decorator = click.option(
     show_default=True,
     help="all: every photographed pixel, with black borders; valid: only places that were photographed.",
 )
-as_json: Decorator = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
-calibration_file: Decorator = click.argument("calibration", type=click.Path(path_type=Path), metavar="CALIBRATION.json")
+as_json: Decorator = click.option(
+    "--json", "as_json", is_flag=True, help="Print one JSON object instead of text."
+)
+calibration_file: Decorator = click.argument(
+    "calibration", type=click.Path(path_type=Path), metavar="CALIBRATION.json"
+)

@@ -1,7 +1,4 @@
-"""Progress bars on stderr, handed down to the floors below as plain callables.
-
-Floor 8.
-"""
+"""Progress bars on stderr, handed down to the floors below as plain callables."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""`orthoscope report`: a calibration to its page.
-
-Floor 8.
-"""
+"""`orthoscope report`: a calibration to its page."""
 
 from __future__ import annotations
 
@@ -22,24 +19,39 @@ Example:
 
 @click.command(epilog=EXAMPLE)
 @options.calibration_file
-@click.option("--photos", multiple=True, metavar="PHOTOS", help="The photographs, to show one before and after.")
+@click.option(
+    "--photos", multiple=True, metavar="PHOTOS", help="The photographs, to show one before and after."
+)
 @options.folds
 @options.keep
 @options.jobs
 @options.cluster
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("report.html"), show_default=True, help="File to write."
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path("report.html"),
+    show_default=True,
+    help="File to write.",
 )
-def report(calibration: Path, photos: tuple[str, ...], folds: int, keep: str, jobs: int | None, cluster: str | None, out: Path) -> None:
+def report(
+    calibration: Path,
+    photos: tuple[str, ...],
+    folds: int,
+    keep: str,
+    jobs: int | None,
+    cluster: str | None,
+    out: Path,
+) -> None:
     """Write the report page of a calibration: one HTML file that needs nothing else."""
     from orthoscope.cli.executors import processes
     from orthoscope.cli.progress import bar
     from orthoscope.evaluation.evaluate import evaluate
-    from orthoscope.io.files import check_folder
-    from orthoscope.io.images import photographs
-    from orthoscope.io.own_json import load_calibration
-    from orthoscope.io.undistort import before_and_after
+    from orthoscope.files.images import photographs
+    from orthoscope.files.whole_files import check_folder
+    from orthoscope.formats.own.json import load_calibration
     from orthoscope.report.page import write_report
+    from orthoscope.straight.undistort import before_and_after
 
     loaded = load_calibration(calibration)
     check_folder(out.parent)

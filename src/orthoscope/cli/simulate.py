@@ -1,7 +1,4 @@
-"""`orthoscope simulate`: a camera whose truth is known, to detections or rendered photographs.
-
-Floor 8.
-"""
+"""`orthoscope simulate`: a camera whose truth is known, to detections or rendered photographs."""
 
 from __future__ import annotations
 
@@ -29,16 +26,44 @@ Examples:
     type=click.Path(path_type=Path),
     help="A camera.json, calibration.json or truth.json; by default the camera of `orthoscope demo`.",
 )
-@click.option("--lens", metavar="LENS", help="Instead of --camera: a lens with its coefficients, such as brown:k1=-0.3,k2=0.1.")
+@click.option(
+    "--lens",
+    metavar="LENS",
+    help="Instead of --camera: a lens with its coefficients, such as brown:k1=-0.3,k2=0.1.",
+)
 @options.image_size
-@click.option("--focal", type=click.FloatRange(1), help="With --lens: focal length, pixels; by default the image's width.")
-@click.option("--target", default="chessboard:9x6:25mm", show_default=True, metavar="SPEC", help="What stands before the camera.")
+@click.option(
+    "--focal",
+    type=click.FloatRange(1),
+    help="With --lens: focal length, pixels; by default the image's width.",
+)
+@click.option(
+    "--target",
+    default="chessboard:9x6:25mm",
+    show_default=True,
+    metavar="SPEC",
+    help="What stands before the camera.",
+)
 @click.option("--views", default=20, show_default=True, type=click.IntRange(1), help="How many photographs.")
 @click.option(
-    "--noise", default=0.1, show_default=True, type=click.FloatRange(0), help="Standard deviation of each corner coordinate, pixels."
+    "--noise",
+    default=0.1,
+    show_default=True,
+    type=click.FloatRange(0),
+    help="Standard deviation of each corner coordinate, pixels.",
 )
-@click.option("--tilt-noise", is_flag=True, help="Let the noise grow with the target's tilt, doubling at 70 degrees (the paper's law).")
-@click.option("--tilt", default=45.0, show_default=True, type=click.FloatRange(0, 70), help="Greatest tilt of the target, degrees.")
+@click.option(
+    "--tilt-noise",
+    is_flag=True,
+    help="Let the noise grow with the target's tilt, doubling at 70 degrees (the paper's law).",
+)
+@click.option(
+    "--tilt",
+    default=45.0,
+    show_default=True,
+    type=click.FloatRange(0, 70),
+    help="Greatest tilt of the target, degrees.",
+)
 @click.option(
     "--fill",
     nargs=2,
@@ -51,7 +76,12 @@ Examples:
 @click.option("--render", "rendered", is_flag=True, help="Also render the photographs, into OUT/photographs.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of all that is random.")
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("simulated"), show_default=True, help="Folder to write."
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("simulated"),
+    show_default=True,
+    help="Folder to write.",
 )
 def simulate(
     source: Path | None,
@@ -72,16 +102,25 @@ def simulate(
     """Make corners, or photographs, of a camera that is known."""
     import numpy as np
 
-    from orthoscope.evaluation.simulate import Scene, random_views, simulate_detections
-    from orthoscope.geometry.target import parse_target
-    from orthoscope.io.files import check_folder
-    from orthoscope.io.own_json import save
+    from orthoscope.files.whole_files import check_folder
+    from orthoscope.formats.own.json import save
+    from orthoscope.simulation.scene import Scene, random_views, simulate_detections
+    from orthoscope.targets.detections import parse_target
 
     check_folder(out)
     rng = np.random.default_rng(seed)
     camera, board = _camera(source, lens, image_size, focal), parse_target(target)
     margin = _square(board) if rendered else 0.0  # the outer squares are to be in the picture too
-    poses = random_views(camera, board, views, rng=rng, tilt=(0.0, np.deg2rad(tilt)), fill=fill, whole=not partial, margin=margin)
+    poses = random_views(
+        camera,
+        board,
+        views,
+        rng=rng,
+        tilt=(0.0, np.deg2rad(tilt)),
+        fill=fill,
+        whole=not partial,
+        margin=margin,
+    )
     scene = Scene(camera, board, poses)
     save(simulate_detections(scene, noise_px=noise, rng=rng, tilt_noise=tilt_noise), out / "detections.json")
     save(scene, out / "truth.json")
@@ -93,21 +132,28 @@ def simulate(
 
 def _camera(source: Path | None, lens: str | None, image_size: tuple[int, int] | None, focal: float | None):
     """The camera that was asked for: of a file, of a lens, or that of the demo."""
-    from orthoscope.evaluation.render import demo_scene
+    from orthoscope.formats.own.json import load_camera
     from orthoscope.geometry.arrays import InputError
-    from orthoscope.io.own_json import load_camera
     from orthoscope.models.camera import Camera, Intrinsics
     from orthoscope.models.lenses import lens_with_values
+    from orthoscope.simulation.render import demo_scene
 
     if source and lens:
         raise InputError("both --camera and --lens were given; expected one of them. Drop the other.")
     if not lens:
         if image_size or focal:
-            raise InputError("--image-size and --focal go with --lens; a camera of a file has its own. Add --lens or drop them.")
+            raise InputError(
+                "--image-size and --focal go with --lens; a camera of a file has its own. Add --lens or drop"
+                " them."
+            )
         return load_camera(source) if source else demo_scene().camera
     width, height = image_size or (1280, 960)
     focal = focal or float(width)
-    return Camera((width, height), Intrinsics(focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)), lens_with_values(lens))
+    return Camera(
+        (width, height),
+        Intrinsics(focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)),
+        lens_with_values(lens),
+    )
 
 
 def write_photographs(scene, folder: Path, *, seed: int) -> Path:
@@ -115,8 +161,8 @@ def write_photographs(scene, folder: Path, *, seed: int) -> Path:
     import numpy as np
 
     from orthoscope.cli.progress import bar
-    from orthoscope.evaluation.render import photographs
-    from orthoscope.io.images import write_image
+    from orthoscope.files.images import write_image
+    from orthoscope.simulation.render import photographs
 
     with bar("rendering") as progress:
         for done, (name, image) in enumerate(photographs(scene, rng=np.random.default_rng(seed)), 1):

@@ -1,7 +1,4 @@
-"""What the verbs print: an evaluation as a few lines, or as one JSON object.
-
-Floor 8.
-"""
+"""What the verbs print: an evaluation as a few lines, or as one JSON object."""
 
 from __future__ import annotations
 
@@ -12,11 +9,11 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from orthoscope.evaluation.agreement import MisfitTest
     from orthoscope.evaluation.evaluate import Evaluation
-    from orthoscope.geometry.target import Outlier
-    from orthoscope.methods.calibration import Calibration
+    from orthoscope.evaluation.misfit.f_test import MisfitTest
+    from orthoscope.fitting.calibration import Calibration
     from orthoscope.models.camera import Camera
+    from orthoscope.targets.detections import Outlier
 
 __all__ = ["camera_numbers", "evaluation_lines", "evaluation_numbers", "to_json"]
 
@@ -32,28 +29,42 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
     aside = detections.set_aside
     lines = [f"views      {len(detections.views)} used, {len(aside)} set aside; {detections.corners} corners"]
     lines += [f"           {entry.image}: {entry.reason}" for entry in aside[:SHOWN]]
-    lines += [f"           and {len(aside) - SHOWN} more, all in detections.json"] if len(aside) > SHOWN else []
+    lines += (
+        [f"           and {len(aside) - SHOWN} more, all in detections.json"] if len(aside) > SHOWN else []
+    )
     lines += _outlier_lines(detections.outliers)
     lines.append(
-        f"rms        {evaluation.rms_px:.3f} px per point (median {evaluation.median_px:.3f}, largest {evaluation.largest_px:.2f})"
+        f"rms        {evaluation.rms_px:.3f} px per point (median {evaluation.median_px:.3f}, largest"
+        f" {evaluation.largest_px:.2f})"
     )
     if not math.isnan(evaluation.held_out_rms_px):
         lines.append(
-            f"held out   {evaluation.held_out_rms_px:.3f} ± {evaluation.held_out_error_px:.3f} px per point, on views that were not used"
+            f"held out   {evaluation.held_out_rms_px:.3f} ± {evaluation.held_out_error_px:.3f} px per point,"
+            " on views that were not used"
         )
     lines.append(f"NCE        {evaluation.nce:.3f} (1 is what rounding to whole pixels would give)")
     lines.append(f"misfit     {_misfit_line(evaluation.misfit.target.test, evaluation.misfit.lens.test)}")
     deviations = calibration.uncertainty.deviations
     values = dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.intrinsics.as_tuple(), strict=True))
     lines.append(
-        "camera     " + "  ".join(_number(name, value, deviations) for name, value in values.items() if value or name in deviations)
+        "camera     "
+        + "  ".join(
+            _number(name, value, deviations) for name, value in values.items() if value or name in deviations
+        )
     )
     coefficients = dict(zip(camera.lens.names(), camera.lens.coefficients, strict=True))
-    told = "  ".join(_number(name, value, deviations) for name, value in coefficients.items() if value or name in deviations)
+    told = "  ".join(
+        _number(name, value, deviations)
+        for name, value in coefficients.items()
+        if value or name in deviations
+    )
     lines.append(f"lens       {lens_name(camera.lens)}  {told}")
     if camera.lens_frame:
         centre = {"centre_x": camera.lens_frame.cx, "centre_y": camera.lens_frame.cy}
-        lines.append("           about its own centre  " + "  ".join(_number(name, value, deviations) for name, value in centre.items()))
+        lines.append(
+            "           about its own centre  "
+            + "  ".join(_number(name, value, deviations) for name, value in centre.items())
+        )
     lines += _choice_lines(calibration)
     lines += [f"warning    {warning}" for warning in evaluation.warnings]
     return [*lines, f"verdict    {evaluation.verdict}"]
@@ -71,9 +82,12 @@ def _choice_lines(calibration: Calibration) -> list[str]:
     others = [one for one in calibration.candidates if one.loses_px != 0.0]
     if others:
         other = min(others, key=lambda one: math.inf if math.isnan(one.held_out_px) else one.held_out_px)
-        how = f"loses {other.loses_px:.3f} px" if other.loses_px > 0 else f"would gain {-other.loses_px:.3f} px"
+        how = (
+            f"loses {other.loses_px:.3f} px" if other.loses_px > 0 else f"would gain {-other.loses_px:.3f} px"
+        )
         lines.append(
-            f"choice     target {settings['target']}, lens {settings['lens']}; next target {other.target}, lens {other.lens} {how} held out"
+            f"choice     target {settings['target']}, lens {settings['lens']}; next target {other.target},"
+            f" lens {other.lens} {how} held out"
         )
     return lines
 
@@ -89,7 +103,10 @@ def evaluation_numbers(evaluation: Evaluation) -> dict[str, Any]:
         "held_out_rms_px": evaluation.held_out_rms_px,
         "held_out_error_px": evaluation.held_out_error_px,
         "nce": evaluation.nce,
-        "misfit": {"target": asdict(evaluation.misfit.target.test), "lens": asdict(evaluation.misfit.lens.test)},
+        "misfit": {
+            "target": asdict(evaluation.misfit.target.test),
+            "lens": asdict(evaluation.misfit.lens.test),
+        },
         "coverage": evaluation.coverage,
         "corners": detections.corners,
         "views_used": len(detections.views),
@@ -97,7 +114,12 @@ def evaluation_numbers(evaluation: Evaluation) -> dict[str, Any]:
         "corners_left_out": [outlier._asdict() for outlier in detections.outliers],
         "views_suspect": [{"name": image, "reason": reason} for image, reason in evaluation.suspects],
         "views": [
-            {"name": view.image, "corners": view.corners, "rms_px": view.rms_px, "held_out_rms_px": view.held_out_rms_px}
+            {
+                "name": view.image,
+                "corners": view.corners,
+                "rms_px": view.rms_px,
+                "held_out_rms_px": view.held_out_rms_px,
+            }
             for view in evaluation.views
         ],
         "camera": camera_numbers(calibration.camera),
@@ -126,7 +148,10 @@ def camera_numbers(camera: Camera) -> dict[str, Any]:
         "height": camera.image_size[1],
         **values,
         "lens": {"name": lens_name(camera.lens), "coefficients": coefficients},
-        "lens_frame": camera.lens_frame and dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.lens_frame.as_tuple(), strict=True)),
+        "lens_frame": (
+            camera.lens_frame
+            and dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.lens_frame.as_tuple(), strict=True))
+        ),
     }
 
 

@@ -1,7 +1,4 @@
-"""`orthoscope undistort`: photographs to straight pictures, films to straight films.
-
-Floor 8.
-"""
+"""`orthoscope undistort`: photographs to straight pictures, films to straight films."""
 
 from __future__ import annotations
 
@@ -30,22 +27,33 @@ PHOTOS are files, folders and globs of photographs; and video files (mp4, m4v, m
 @options.calibration_file
 @options.photos
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("straight"), show_default=True, help="Folder to write."
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("straight"),
+    show_default=True,
+    help="Folder to write.",
 )
 @options.keep
 @options.jobs
 @options.cluster
 @options.as_json
 def undistort(
-    calibration: Path, photos: tuple[str, ...], out: Path, keep: str, jobs: int | None, cluster: str | None, as_json: bool
+    calibration: Path,
+    photos: tuple[str, ...],
+    out: Path,
+    keep: str,
+    jobs: int | None,
+    cluster: str | None,
+    as_json: bool,
 ) -> None:
     """Take the lens out of photographs and films: straight lines come out straight."""
     from orthoscope.cli.summary import camera_numbers, to_json
-    from orthoscope.io.files import check_folder
-    from orthoscope.io.images import photographs
-    from orthoscope.io.own_json import load_camera, save
-    from orthoscope.io.undistort import straight_camera
-    from orthoscope.io.video import is_video
+    from orthoscope.files.images import photographs
+    from orthoscope.files.whole_files import check_folder
+    from orthoscope.formats.own.json import load_camera, save
+    from orthoscope.straight.film import is_video
+    from orthoscope.straight.undistort import straight_camera
 
     camera = load_camera(calibration)
     films = list(dict.fromkeys(Path(path) for path in photos if is_video(path)))
@@ -53,7 +61,9 @@ def undistort(
     paths = photographs(pictures) if pictures or not films else []
     check_folder(out)
     frames = straighten_films(films, camera, out, keep=keep, jobs=jobs)
-    written, failed = straighten(paths, camera, out, keep=keep, jobs=jobs, cluster=cluster) if paths else ([], [])
+    written, failed = (
+        straighten(paths, camera, out, keep=keep, jobs=jobs, cluster=cluster) if paths else ([], [])
+    )
     straight = straight_camera(camera, keep=keep)
     save(straight, out / "camera.json")
     if as_json:
@@ -66,20 +76,26 @@ def undistort(
     click.echo(f"wrote      {'; '.join(made)}, and {out / 'camera.json'}, their camera")
 
 
-def straighten_films(paths: list[Path], camera: Any, out: Path, *, keep: str, jobs: int | None) -> dict[Path, int]:
+def straighten_films(
+    paths: list[Path], camera: Any, out: Path, *, keep: str, jobs: int | None
+) -> dict[Path, int]:
     """Write straight films, one after the other; returns for each its number of frames."""
     from orthoscope.cli.executors import threads
     from orthoscope.cli.progress import bar
     from orthoscope.geometry.arrays import InputError
-    from orthoscope.io.video import undistort_video
+    from orthoscope.straight.film import undistort_video
 
     places = {out / path.name: path for path in paths}
     if len(places) < len(paths):
-        raise InputError("two films have the same name; straighten them into folders of their own, one after the other.")
+        raise InputError(
+            "two films have the same name; straighten them into folders of their own, one after the other."
+        )
     frames = {}
     for place, path in places.items():
         with threads(jobs) as executor, bar("straightening") as progress:
-            frames[place] = undistort_video(path, camera, place, keep=keep, executor=executor, progress=progress)
+            frames[place] = undistort_video(
+                path, camera, place, keep=keep, executor=executor, progress=progress
+            )
     return frames
 
 
@@ -90,12 +106,14 @@ def straighten(
     from orthoscope.cli.executors import threads
     from orthoscope.cli.progress import bar
     from orthoscope.geometry.arrays import InputError
-    from orthoscope.io.undistort import undistort_photographs
+    from orthoscope.straight.undistort import undistort_photographs
 
     if cluster:  # its workers may stand in another folder
         paths, out = [path.absolute() for path in paths], out.absolute()
     with bar("straightening") as progress, threads(jobs, cluster) as executor:
-        written, failed = undistort_photographs(paths, camera, out, keep=keep, executor=executor, progress=progress)
+        written, failed = undistort_photographs(
+            paths, camera, out, keep=keep, executor=executor, progress=progress
+        )
     for name, reason in failed:
         click.echo(f"left out   {name}: {reason}", err=True)
     if not written:

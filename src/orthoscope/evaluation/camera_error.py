@@ -1,25 +1,27 @@
 """How far off the camera is: predicted, in pixels, everywhere in the frame.
 
-The *camera error* at a place is the distance in pixels between this camera's image of a direction and the true camera's, a turn of
-the camera fitted out (a turn and a shift for things at the target's distance).  Nobody knows the true camera; what is predicted is the
-root mean square of that distance,
+The *camera error* at a place is the distance in pixels between this camera's image of a direction and the
+true camera's, a turn of the camera fitted out (a turn and a shift for things at the target's distance).
+Nobody knows the true camera; what is predicted is the root mean square of that distance,
 
     E^2 = max(alike, jackknife + prior) + bias^2,
 
-the larger of two variances (scatter.py: errors alike within a view; views left out), and for a camera that follows a formula, or takes
-its target for flat, its squared difference to the richest model beyond what chance makes of it:
+the larger of two variances (scatter.py: errors alike within a view; views left out), and for a camera that
+follows a formula, or takes its target for flat, its squared difference to the richest model beyond what
+chance makes of it:
 
     bias^2 = max(0, |G (c - rich)|^2 - jackknife of the difference).
 
-Headline figures are root mean squares over places: the *seen part*, at corners that were detected, and the whole *frame*.  The region
-where the camera may be used is grown from the middle of the seen part as far as E stays below a limit.
-C. Hagemann, J. Knorr, H. Janssen and C. Stiller, Inferring bias and uncertainty in camera calibration, IJCV 2022, and mrcal's
-documentation predict the like from corner noise alone.
+Headline figures are root mean squares over places: the *seen part*, at corners that were detected, and the
+whole *frame*.  The region where the camera may be used is grown from the middle of the seen part as far as E
+stays below a limit. C. Hagemann, J. Knorr, H. Janssen and C. Stiller, Inferring bias and uncertainty in
+camera calibration, IJCV 2022, and mrcal's documentation predict the like from corner noise alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,10 +46,12 @@ class CameraError:
     Args:
         seen_px, frame_px: root mean square over the seen part and over the frame, of what is far away.
         near_seen_px, near_frame_px: the same of things at the target's distance.
-        model_px, alike_px, views_px, bias_px: over the seen part, far away, what makes it up: independent errors of corners with the priors'
-            scatter; these with errors alike within a view; the jackknife over views with the priors' scatter; what a poorer model misses.
+        model_px, alike_px, views_px, bias_px: over the seen part, far away, what makes it up: independent
+            errors of corners with the priors' scatter; these with errors alike within a view; the jackknife
+            over views with the priors' scatter; what a poorer model misses.
         distance: of the target, metres, in the typical view.
-        far, near: (rows, columns) over the frame, row by row, at the cells' centres; NaN where the camera has no image.
+        far, near: (rows, columns) over the frame, row by row, at the cells' centres; NaN where the camera has
+            no image.
         limit_px: where the error is larger the camera is not to be used.
         region: (n,2) pixels, the polygon of the places where it may be.
     """
@@ -71,10 +75,27 @@ class CameraError:
         return _inside(self.region, np.asarray(pixels, dtype=float))
 
 
+class _Parts(NamedTuple):
+    """A predicted error in all, and what makes it up, pixels."""
+
+    total: float
+    model: float
+    alike: float
+    views: float
+    bias: float
+
+
 class _Variances:
     """E^2 and its parts at places along unit rays, a motion fitted out over the first of them."""
 
-    def __init__(self, scatter: Scatter, rich: Scatter | None, rays: Float[ndarray, "n 3"], fitted: int, distance: float) -> None:
+    def __init__(
+        self,
+        scatter: Scatter,
+        rich: Scatter | None,
+        rays: Float[ndarray, "n 3"],
+        fitted: int,
+        distance: float,
+    ) -> None:
         slopes = _settled(scatter, rays, fitted, distance)
         self.model, self.alike = _spread(slopes, scatter.model), _spread(slopes, scatter.alike)
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
@@ -91,13 +112,13 @@ class _Variances:
     def total(self) -> Float[ndarray, " n"]:
         return np.maximum(self.alike, self.views) + self.bias
 
-    def over(self, some: slice) -> tuple[float, float, float, float, float]:
-        """Root mean squares over some places: in all, model, alike, views, bias (what is left of it in the mean)."""
+    def over(self, some: slice) -> _Parts:
+        """Root mean squares over some places; the bias is what is left of it in the mean."""
         model, alike, views = (float(np.nanmean(part[some])) for part in (self.model, self.alike, self.views))
         bias = 0.0
         if self.bias.any():
             bias = max(float(np.nanmean(self.apart[some] - self.by_chance[some])), 0.0)
-        return tuple(float(np.sqrt(part)) for part in (max(alike, views) + bias, model, alike, views, bias))  # type: ignore[return-value]
+        return _Parts(*np.sqrt([max(alike, views) + bias, model, alike, views, bias]).tolist())
 
 
 def predicted_error(
@@ -141,7 +162,9 @@ def predicted_error(
     )
 
 
-def rms_difference(camera: Camera, true: Camera, seen: Float[ndarray, "s 2"], *, distance: float = np.inf) -> float:
+def rms_difference(
+    camera: Camera, true: Camera, seen: Float[ndarray, "s 2"], *, distance: float = np.inf
+) -> float:
     """The camera error itself, where the true camera is known: rms pixels over the seen places.
 
     Args:
@@ -160,8 +183,12 @@ def seen_places(pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "s 2"]:
     return ordered[np.unique(np.linspace(0, len(ordered) - 1, PLACES).round().astype(int))]
 
 
-def _settled(scatter: Scatter, rays: Float[ndarray, "n 3"], fitted: int, distance: float) -> Float[ndarray, "n 2 d"]:
-    """Slopes of the image by the camera's unknowns, the motion taken out that undoes most over the first places."""
+def _settled(
+    scatter: Scatter, rays: Float[ndarray, "n 3"], fitted: int, distance: float
+) -> Float[ndarray, "n 2 d"]:
+    """Slopes of the image by the camera's unknowns, the motion taken out that undoes most over the first
+    places.
+    """
     with np.errstate(invalid="ignore"):
         slopes = image_slopes(scatter.camera, rays, scatter.names)
         motion = motion_slopes(scatter.camera, rays, distance)
@@ -195,7 +222,9 @@ def _ways(middle: Float[ndarray, " 2"], width: int, height: int) -> Float[ndarra
     return middle + reach[:, None, None] * share[:, None] * way[:, None]
 
 
-def _grown(middle: Float[ndarray, " 2"], ways: ndarray, good: Bool[ndarray, "directions steps"]) -> Float[ndarray, "n 2"]:
+def _grown(
+    middle: Float[ndarray, " 2"], ways: ndarray, good: Bool[ndarray, "directions steps"]
+) -> Float[ndarray, "n 2"]:
     """The polygon of the last place in each direction up to which all are good; the middle where none is."""
     reached = np.where(good.all(1), STEPS, np.argmin(good, axis=1))
     edge = ways[np.arange(len(ways)), np.maximum(reached - 1, 0)]

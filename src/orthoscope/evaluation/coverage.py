@@ -1,17 +1,17 @@
 """How much of the frame the corners cover, and where they do not.
 
-Floor 4.  A camera is known where corners were seen; elsewhere its lens formula only extrapolates.  Cells that no ray reaches, outside
-the image circle of a wide lens, are not missed.
+A camera is known where corners were seen; elsewhere its lens formula only extrapolates. Cells that no ray
+reaches, outside the image circle of a wide lens, are not missed.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Bool, Int, ndarray
-from orthoscope.geometry.target import Detections
-from orthoscope.methods.calibration import Calibration
 from orthoscope.models.camera import Camera
+from orthoscope.targets.detections import Detections
 
 __all__ = ["COVERAGE_GRID", "cells_with_rays", "corners_by_cell", "emptiest_place", "share_covered"]
 
@@ -25,7 +25,9 @@ def share_covered(calibration: Calibration) -> float:
     return float(seen.sum() / max((seen | cells_with_rays(calibration.camera)).sum(), 1))
 
 
-def corners_by_cell(detections: Detections, grid: tuple[int, int] = COVERAGE_GRID) -> Int[ndarray, "rows columns"]:
+def corners_by_cell(
+    detections: Detections, grid: tuple[int, int] = COVERAGE_GRID
+) -> Int[ndarray, "rows columns"]:
     """How many corners were seen in each cell of a grid (columns, rows) over the frame."""
     pixels = np.concatenate([view.pixels for view in detections.views])
     x, y = _edges(detections.image_size, grid)
@@ -49,7 +51,9 @@ def emptiest_place(detections: Detections) -> str:
 
 def _edges(image_size: tuple[int, int], grid: tuple[int, int]) -> tuple[ndarray, ndarray]:
     """The cells' sides along x and along y, pixels."""
-    return np.linspace(-0.5, image_size[0] - 0.5, grid[0] + 1), np.linspace(-0.5, image_size[1] - 0.5, grid[1] + 1)
+    return np.linspace(-0.5, image_size[0] - 0.5, grid[0] + 1), np.linspace(
+        -0.5, image_size[1] - 0.5, grid[1] + 1
+    )
 
 
 def _has_ray(camera: Camera, x: ndarray, y: ndarray) -> ndarray:

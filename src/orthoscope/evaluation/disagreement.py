@@ -26,13 +26,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.evaluation.difference import image_difference
-from orthoscope.evaluation.f_distribution import f_survival
+from orthoscope.models.difference import image_difference
+from orthoscope.evaluation.misfit.f_distribution import f_survival
 from orthoscope.fitting.leave_one_out import hat_of
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.geometry.target import Detections
-from orthoscope.methods.reprojection import with_parameters
+from orthoscope.targets.detections import Detections
+from orthoscope.fitting.reprojection import with_parameters
 from orthoscope.models.camera import Camera
 
 __all__ = ["Disagreement", "Wishes", "changes_of", "disagreement", "spread_of", "wishes"]
@@ -42,7 +42,11 @@ FAINT = 1e-3  # of the largest: an eigenvalue of T_j below it is no wish
 OWN = 0.3  # singular value of a pattern, C_j projected out: below it the pattern is one that K makes too
 LARGE, SURE = 3.0, 1e-4  # F2 above, p below: views do not agree
 FEWEST_VIEWS = 5
-KINDS = {"zoom": [0], "centre": [1, 2], "shutter": [3, 4]}  # columns: scale, cx, cy, and the shears of a shutter
+KINDS = {
+    "zoom": [0],
+    "centre": [1, 2],
+    "shutter": [3, 4],
+}  # columns: scale, cx, cy, and the shears of a shutter
 SPREADING = 200  # rounds of expectation maximisation
 SAMPLE = 300  # pixels at which an image's movement is looked at
 
@@ -112,7 +116,9 @@ def disagreement(fit: Linearised, detections: Detections) -> Disagreement:
     points, pixels = detections.target.points, np.concatenate([view.pixels for view in detections.views])
     if fit.views < FEWEST_VIEWS or len(names) < 3:
         return AGREED
-    moves = np.concatenate([fit.moves(changes), fit.without_pose(fit.root[..., None] * _shears(detections))], axis=2)
+    moves = np.concatenate(
+        [fit.moves(changes), fit.without_pose(fit.root[..., None] * _shears(detections))], axis=2
+    )
     of_K = wishes(fit, points, moves[:, :, : len(names)])
     tests = [of_K, *(wishes(fit, points, moves[:, :, columns]) for columns in KINDS.values())]
     strongest = min(tests, key=lambda test: (not test.certain, test.p_value))
@@ -181,11 +187,15 @@ def _pseudo_inverse(told: Float[ndarray, "m c c"]) -> tuple[Float[ndarray, "m c 
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).max(0), 1e-300))
     values, vectors = np.linalg.eigh(told * scale * scale[:, None])
     strong = values > FAINT * max(values.max(), 1e-300)
-    inverse = (vectors * np.where(strong, 1.0 / np.where(strong, values, 1.0), 0.0)[:, None]) @ vectors.transpose(0, 2, 1)
+    inverse = (
+        vectors * np.where(strong, 1.0 / np.where(strong, values, 1.0), 0.0)[:, None]
+    ) @ vectors.transpose(0, 2, 1)
     return inverse * scale * scale[:, None], strong.sum(1).astype(float)
 
 
-def _alike(fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]) -> tuple[float, float]:
+def _alike(
+    fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]
+) -> tuple[float, float]:
     """tau of the second-order patterns that the changes do not make, and their degrees of freedom."""
     x, y = (points[:, :2] - points[:, :2].mean(0)).T / max(float(np.ptp(points[:, :2])), 1e-300)
     shapes, zero = np.stack([x * x, x * y, y * y], axis=1), np.zeros((len(points), 3))
@@ -242,7 +252,8 @@ def _kind(fit: Linearised, moves: Float[ndarray, "m n 5"]) -> str:
     everything = list(range(moves.shape[2]))
     whole = explained(everything)
     beyond = {
-        kind: (whole - explained([i for i in everything if i not in columns])) / len(columns) for kind, columns in KINDS.items()
+        kind: (whole - explained([i for i in everything if i not in columns])) / len(columns)
+        for kind, columns in KINDS.items()
     }
     return max(beyond, key=lambda kind: beyond[kind])
 

@@ -1,7 +1,8 @@
 """How good a calibration is: its numbers, and the sentences that verdict.py makes of them.
 
-Floor 4.  The error that counts is that of photographs which were held out; rms, NCE, coverage and the views that do not belong stand
-beside it.  What held-out photographs cannot show, a target or a formula that is wrong in all of them, the misfit tests find.
+The error that counts is that of photographs which were held out; rms, NCE, coverage and the views that do not
+belong stand beside it. What held-out photographs cannot show, a target or a formula that is wrong in all of
+them, the misfit tests find.
 """
 
 from __future__ import annotations
@@ -16,17 +17,24 @@ import numpy as np
 
 from orthoscope.evaluation.coverage import share_covered
 from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
-from orthoscope.evaluation.misfit import Misfit, misfit
-from orthoscope.evaluation.verdict import Findings, ViewError, corners_beyond, suspects_among, verdict_on, warnings_about
+from orthoscope.evaluation.misfit.misfit import Misfit, misfit
+from orthoscope.evaluation.verdict import (
+    Findings,
+    ViewError,
+    corners_beyond,
+    suspects_among,
+    verdict_on,
+    warnings_about,
+)
+from orthoscope.fitting.calibration import Calibration, residuals_of, rms
+from orthoscope.fitting.held_out import HeldOut, held_out
+from orthoscope.fitting.resection import resect
+from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.geometry.target import Detections
 from orthoscope.methods import METHODS
-from orthoscope.methods.calibration import Calibration, residuals_of, rms
-from orthoscope.methods.held_out import HeldOut, held_out
-from orthoscope.methods.resection import resect
-from orthoscope.methods.screening import screened
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
+from orthoscope.targets.detections import Detections
 
 __all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on"]
 
@@ -35,11 +43,12 @@ __all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on"]
 class Evaluation:
     """What `evaluate` finds out about a calibration.
 
-    rms_px, median_px, largest_px: of |residual| over the corners it was made from.  held_out_rms_px: over all corners, each from a fold
-    that did not use its photograph; held_out_error_px: its standard error over views; NaN where there were too few views.  nce: of
-    held-out views where there are any, else of the training views.  misfit: of the target and of the lens (misfit.py).  coverage: share
-    of the frame's cells where corners were seen (coverage.py).  suspects: views and why they do not belong.  warnings:
-    sentences.  verdict: one sentence.  held_out_residuals: one array (n,2) for each view, NaN where not done.
+    rms_px, median_px, largest_px: of |residual| over the corners it was made from. held_out_rms_px: over all
+    corners, each from a fold that did not use its photograph; held_out_error_px: its standard error over
+    views; NaN where there were too few views. nce: of held-out views where there are any, else of the
+    training views. misfit: of the target and of the lens (misfit.py). coverage: share of the frame's cells
+    where corners were seen (coverage.py). suspects: views and why they do not belong. warnings: sentences.
+    verdict: one sentence. held_out_residuals: one array (n,2) for each view, NaN where not done.
     """
 
     calibration: Calibration
@@ -60,7 +69,9 @@ class Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class UnseenError:
-    """Error of a camera on photographs it was not made from: rms_px per point, of each view too; nce; the detections that could be used."""
+    """Error of a camera on photographs it was not made from: rms_px per point, of each view too; nce; the
+    detections that could be used.
+    """
 
     detections: Detections
     rms_px: float
@@ -71,17 +82,24 @@ class UnseenError:
 def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | None = None) -> UnseenError:
     """The error of a camera on other photographs: the camera stays fixed, the pose of each view is fitted.
 
-    shape: of the target, where it is known and these photographs show the same one.
-    Raises InputError where the photographs are of another size than the camera's, CalibrationError where no view can be used.
+    shape: of the target, where it is known and these photographs show the same one. Raises InputError where
+    the photographs are of another size than the camera's, CalibrationError where no view can be used.
     """
     if tuple(detections.image_size) != tuple(camera.image_size):
         (width, height), (w, h) = detections.image_size, camera.image_size
-        raise InputError(f"these photographs are {width}x{height}; the camera was calibrated at {w}x{h}. Hand in photographs of that size.")
-    used = screened(detections)
+        raise InputError(
+            f"these photographs are {width}x{height}; the camera was calibrated at {w}x{h}. Hand in"
+            " photographs of that size."
+        )
+    used = with_usable_views(detections)
     poses = resect(camera, used, shape=shape)
     residuals = residuals_of(camera, poses, used, shape=shape)
     estimated, observed = lateral_errors(camera, poses, used, shape=shape)
-    nce = normalised_calibration_error(estimated, observed, camera.intrinsics) if len(observed) else float("nan")
+    nce = (
+        normalised_calibration_error(estimated, observed, camera.intrinsics)
+        if len(observed)
+        else float("nan")
+    )
     return UnseenError(used, rms(np.concatenate(residuals)), tuple(rms(e) for e in residuals), nce)
 
 
@@ -94,7 +112,8 @@ def evaluate(
 ) -> Evaluation:
     """Judge a calibration by photographs it has not seen, by its residuals and by what its views cover.
 
-    folds: of views; the calibration's own method is called again on each (docs/conventions.md).  executor, progress: as in `held_out`.
+    folds: of views; the calibration's own method is called again on each (docs/conventions.md). executor,
+    progress: as in `held_out`.
     """
     detections = calibration.detections
     refit = partial(METHODS[calibration.method], **calibration.settings)
@@ -106,7 +125,12 @@ def evaluate(
         for view, e, e_unseen in zip(detections.views, residuals, unseen.residuals, strict=True)
     )
     found = Findings(
-        calibration, unseen, misfit(calibration), share_covered(calibration), suspects_among(views), corners_beyond(calibration)
+        calibration,
+        unseen,
+        misfit(calibration),
+        share_covered(calibration),
+        suspects_among(views),
+        corners_beyond(calibration),
     )
     return Evaluation(
         calibration=calibration,
@@ -131,5 +155,11 @@ def _nce(calibration: Calibration, unseen: HeldOut) -> float:
     detections = calibration.detections
     if not math.isnan(nce := held_out_nce(unseen, detections)):
         return nce
-    estimated, observed = lateral_errors(calibration.camera, calibration.camera_from_target, detections, shape=calibration.target_shape)
-    return normalised_calibration_error(estimated, observed, calibration.camera.intrinsics) if len(observed) else float("nan")
+    estimated, observed = lateral_errors(
+        calibration.camera, calibration.camera_from_target, detections, shape=calibration.target_shape
+    )
+    return (
+        normalised_calibration_error(estimated, observed, calibration.camera.intrinsics)
+        if len(observed)
+        else float("nan")
+    )

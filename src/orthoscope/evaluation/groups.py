@@ -25,12 +25,12 @@ from orthoscope.evaluation.disagreement import Disagreement, changes_of, spread_
 from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
-from orthoscope.geometry.target import Detections
-from orthoscope.methods.calibration import residuals_of
+from orthoscope.targets.detections import Detections
+from orthoscope.fitting.calibration import residuals_of
 from orthoscope.methods.fccm import fccm
-from orthoscope.methods.joint_fit import JointFit, fit_jointly
-from orthoscope.methods.joint_linearised import linearised
-from orthoscope.methods.resection import resect
+from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
+from orthoscope.methods.decoupled.step_one_linearised import linearised
+from orthoscope.fitting.resection import resect
 from orthoscope.models.lenses import FREE
 
 __all__ = ["Groups", "two_groups"]
@@ -108,7 +108,9 @@ def _quadratics(fit: Linearised, noise: float, more: tuple[str, ...] = ()) -> _Q
     _, changes = changes_of(fit, more)
     moves = fit.moves(changes)
     told = moves.transpose(0, 2, 1) @ (moves - hat_of(fit, moves))
-    return _Quadratics((moves * fit.errors[..., None]).sum(1) / noise, 0.5 * (told + told.transpose(0, 2, 1)) / noise)
+    return _Quadratics(
+        (moves * fit.errors[..., None]).sum(1) / noise, 0.5 * (told + told.transpose(0, 2, 1)) / noise
+    )
 
 
 def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
@@ -118,10 +120,14 @@ def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
     wishes = -np.linalg.solve(say.told + faint, say.score[..., None])[..., 0]
     cuts = [[wish > cut for cut in np.sort(wish)[FEWEST - 1 : -FEWEST]] for wish in wishes.T]
     rng = np.random.default_rng(0)
-    starts = [rng.random(views) < 0.5 for _ in range(STARTS)] + [start for of_wish in cuts for start in of_wish]
+    starts = [rng.random(views) < 0.5 for _ in range(STARTS)] + [
+        start for of_wish in cuts for start in of_wish
+    ]
     ends = [_clustered(say, start) for start in starts]
     ends += [min(of_wish, key=lambda second: _value(say, second)) for of_wish in cuts if of_wish]
-    able = {(second ^ second[0]).tobytes(): second for second in ends if FEWEST <= second.sum() <= views - FEWEST}
+    able = {
+        (second ^ second[0]).tobytes(): second for second in ends if FEWEST <= second.sum() <= views - FEWEST
+    }
     return sorted(((_value(say, second), second) for second in able.values()), key=lambda entry: entry[0])
 
 
@@ -151,7 +157,9 @@ def _two_values(say: _Quadratics) -> Groups | None:
     likely = np.zeros(share.shape[1])
     for _ in range(SETTLING):
         weight = np.maximum(share.mean(1), 1e-6)
-        each = np.stack([np.log(w) - 0.5 * say.at(say.lowest(part)) for w, part in zip(weight, share, strict=True)])
+        each = np.stack(
+            [np.log(w) - 0.5 * say.at(say.lowest(part)) for w, part in zip(weight, share, strict=True)]
+        )
         likely = np.logaddexp(*each)
         share = np.exp(each - likely)
     if likely.sum() - _likelihood_of_spread(say) < TWICE_AS_LIKELY:
@@ -166,10 +174,14 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
     spread = spread_of(say.score, say.told)
     c = len(spread)
     mean = np.linalg.solve(np.linalg.inv(spread) + say.told, say.score[..., None])[..., 0]
-    return float((0.5 * (say.score * mean).sum(1) - 0.5 * np.linalg.slogdet(np.eye(c) + spread @ say.told)[1]).sum())
+    return float(
+        (0.5 * (say.score * mean).sum(1) - 0.5 * np.linalg.slogdet(np.eye(c) + spread @ say.told)[1]).sum()
+    )
 
 
-def _refined(detections: Detections, second: Bool[ndarray, " m"], *, base: str) -> tuple[float, Bool[ndarray, " m"]] | None:
+def _refined(
+    detections: Detections, second: Bool[ndarray, " m"], *, base: str
+) -> tuple[float, Bool[ndarray, " m"]] | None:
     """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no camera."""
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
@@ -178,7 +190,9 @@ def _refined(detections: Detections, second: Bool[ndarray, " m"], *, base: str) 
             break
         seen.add(second.tobytes())
         try:
-            squares = np.stack([_squares(detections, np.flatnonzero(group), base=base) for group in (~second, second)])
+            squares = np.stack(
+                [_squares(detections, np.flatnonzero(group), base=base) for group in (~second, second)]
+            )
         except CalibrationError:
             break
         total = float(np.where(second, squares[1], squares[0]).sum())
@@ -198,10 +212,13 @@ def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndar
     return squares
 
 
-def _fit(detections: Detections, *, base: str) -> JointFit:
-    return fit_jointly(fccm(detections, lens=base), target="free", through=FREE)
+def _fit(detections: Detections, *, base: str) -> StepOneFit:
+    return fit_step_one(fccm(detections, lens=base), target="free", through=FREE)
 
 
 def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:
-    groups = sorted((np.flatnonzero(group & sure).tolist() for group in (~second, second)), key=lambda group: (-len(group), group))
+    groups = sorted(
+        (np.flatnonzero(group & sure).tolist() for group in (~second, second)),
+        key=lambda group: (-len(group), group),
+    )
     return Groups(tuple(groups[0]), tuple(groups[1]), tuple(np.flatnonzero(~sure).tolist()))

@@ -1,7 +1,4 @@
-"""Error measures in space: the paper's NCE.
-
-Floor 4.
-"""
+"""Error measures in space: the paper's NCE."""
 
 from __future__ import annotations
 
@@ -9,51 +6,69 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from orthoscope.fitting.calibration import points_of
+from orthoscope.fitting.held_out import HeldOut
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.geometry.target import Detections
-from orthoscope.methods.calibration import points_of
-from orthoscope.methods.held_out import HeldOut
 from orthoscope.models.camera import WIDEST, Camera, Intrinsics
 from orthoscope.models.target_shape import TargetShape
+from orthoscope.targets.detections import Detections
 
 __all__ = ["held_out_nce", "lateral_errors", "normalised_calibration_error"]
 
 
-def normalised_calibration_error(estimated: Float[ndarray, "n 3"], observed: Float[ndarray, "n 3"], intrinsics: Intrinsics) -> float:
-    """Mean lateral error over what pixel rounding alone would give; about 1 is as good as digitisation (1 is 0.41 px).
+def normalised_calibration_error(
+    estimated: Float[ndarray, "n 3"], observed: Float[ndarray, "n 3"], intrinsics: Intrinsics
+) -> float:
+    """Mean lateral error over what pixel rounding alone would give; about 1 is as good as digitisation (1 is
+    0.41 px).
 
-    estimated, observed: (n,3) metres, camera frame, same order, equal depths: estimated by back-projecting the undistorted pixel to the
-    depth of the observed point.
-    Raises InputError where a depth is not positive.  Weng, Cohen and Herniou, TPAMI 14(10), 1992; the paper's eq. (11), whose
-    print lacks the square on the depth.
+    estimated, observed: (n,3) metres, camera frame, same order, equal depths: estimated by back-projecting
+    the undistorted pixel to the depth of the observed point. Raises InputError where a depth is not positive.
+    Weng, Cohen and Herniou, TPAMI 14(10), 1992; the paper's eq. (11), whose print lacks the square on the
+    depth.
     """
     depth = observed[:, 2]
     if not (depth > 0).all():
-        raise InputError("a point has no positive depth; NCE compares points in front of the camera. Drop the others.")
+        raise InputError(
+            "a point has no positive depth; NCE compares points in front of the camera. Drop the others."
+        )
     rounding = depth * np.sqrt((intrinsics.fx**-2 + intrinsics.fy**-2) / 12.0)
     lateral = np.hypot(*(estimated - observed)[:, :2].T)
     return float((lateral / rounding).mean())
 
 
 def lateral_errors(
-    camera: Camera, camera_from_target: Sequence[Pose], detections: Detections, *, shape: TargetShape | None = None
+    camera: Camera,
+    camera_from_target: Sequence[Pose],
+    detections: Detections,
+    *,
+    shape: TargetShape | None = None,
 ) -> tuple[ndarray, ndarray]:
     """Points as back-projected from the detected pixels and as the poses place them (n,3 each), for NCE.
 
-    Corners that no straight image would hold (WIDEST), or whose pixel no ray reaches, are left out: towards 90 degrees a lateral error
-    grows without end.
+    Corners that no straight image would hold (WIDEST), or whose pixel no ray reaches, are left out: towards
+    90 degrees a lateral error grows without end.
     """
     points = points_of(detections.target, shape)
-    observed = np.concatenate([pose.apply(points[view.ids]) for pose, view in zip(camera_from_target, detections.views, strict=True)])
+    observed = np.concatenate(
+        [
+            pose.apply(points[view.ids])
+            for pose, view in zip(camera_from_target, detections.views, strict=True)
+        ]
+    )
     rays = camera.unproject(np.concatenate([view.pixels for view in detections.views]))
-    usable = (rays[:, 2] > np.cos(WIDEST)) & (observed[:, 2] > np.cos(WIDEST) * np.sqrt((observed**2).sum(-1)))
+    usable = (rays[:, 2] > np.cos(WIDEST)) & (
+        observed[:, 2] > np.cos(WIDEST) * np.sqrt((observed**2).sum(-1))
+    )
     rays, observed = rays[usable], observed[usable]
     return rays * (observed[:, 2] / rays[:, 2])[:, None], observed
 
 
 def held_out_nce(unseen: HeldOut, detections: Detections) -> float:
-    """NCE over the corners of all views that were held out; NaN where none was, or no straight image would hold any."""
+    """NCE over the corners of all views that were held out; NaN where none was, or no straight image would
+    hold any.
+    """
     total, corners = 0.0, 0
     for camera, shape, poses, views in _by_camera(unseen):
         estimated, observed = lateral_errors(camera, poses, detections.only(views), shape=shape)
@@ -64,11 +79,16 @@ def held_out_nce(unseen: HeldOut, detections: Detections) -> float:
 
 
 def _by_camera(unseen: HeldOut) -> Iterator[tuple[Camera, TargetShape | None, list[Pose], list[int]]]:
-    """The camera of each fold with the target's shape, the poses of the views that it was tried on, and which views these are."""
+    """The camera of each fold with the target's shape, the poses of the views that it was tried on, and which
+    views these are.
+    """
     folds: dict[int, list[int]] = {}
     for i, camera in enumerate(unseen.cameras):
         folds.setdefault(id(camera), []).append(i)
     for views in folds.values():
-        camera, poses = unseen.cameras[views[0]], [pose for i in views if (pose := unseen.camera_from_target[i])]
+        camera, poses = (
+            unseen.cameras[views[0]],
+            [pose for i in views if (pose := unseen.camera_from_target[i])],
+        )
         if camera is not None:
             yield camera, unseen.shapes[views[0]], poses, views

@@ -1,9 +1,10 @@
 """How a camera's image of given directions moves with the camera, its own motion fitted out.
 
-A camera's orientation trades against the poses of its views, and so, for things as near as the target, does its position: only what
-no motion of the camera undoes is an error of it.  With G the slopes of the pixels by the camera's unknowns and M those by a motion (a turn
-w, and for things at a finite distance a shift t), the motion that undoes most over the places where the camera was seen to work
-is fitted there, by least squares in pixels, and taken from everywhere else too.
+A camera's orientation trades against the poses of its views, and so, for things as near as the target, does
+its position: only what no motion of the camera undoes is an error of it.  With G the slopes of the pixels by
+the camera's unknowns and M those by a motion (a turn w, and for things at a finite distance a shift t), the
+motion that undoes most over the places where the camera was seen to work is fitted there, by least squares in
+pixels, and taken from everywhere else too.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orthoscope.methods.reprojection import parameter_columns
+from orthoscope.fitting.reprojection import parameter_columns
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.models.camera import Camera
@@ -24,8 +25,11 @@ ROUNDS = 20
 SETTLED = 1e-9  # radians, and shares of the distance
 
 
-def image_slopes(camera: Camera, rays: Float[ndarray, "n 3"], names: Sequence[str]) -> Float[ndarray, "n 2 d"]:
-    """Slopes of the pixels of rays by named parameters of the camera, then by its displacement's coefficients along x and along y.
+def image_slopes(
+    camera: Camera, rays: Float[ndarray, "n 3"], names: Sequence[str]
+) -> Float[ndarray, "n 2 d"]:
+    """Slopes of the pixels of rays by named parameters of the camera, then by its displacement's coefficients
+    along x and along y.
 
     Raises InputError for a name that the camera does not have.
     """
@@ -40,8 +44,11 @@ def image_slopes(camera: Camera, rays: Float[ndarray, "n 3"], names: Sequence[st
     return np.concatenate([slopes, *of_splines], axis=2)
 
 
-def motion_slopes(camera: Camera, rays: Float[ndarray, "n 3"], distance: float = np.inf) -> Float[ndarray, "n 2 s"]:
-    """Slopes of the pixels of what lies along unit rays by a motion of the camera: a turn, and a shift in units of the distance.
+def motion_slopes(
+    camera: Camera, rays: Float[ndarray, "n 3"], distance: float = np.inf
+) -> Float[ndarray, "n 2 s"]:
+    """Slopes of the pixels of what lies along unit rays by a motion of the camera: a turn, and a shift in
+    units of the distance.
 
     Args:
         distance: of what is looked at; infinite by default, and then there is no shift (s = 3, else 6).
@@ -59,7 +66,8 @@ def difference_of_images(
     *,
     distance: float = np.inf,
 ) -> Float[ndarray, "n 2"]:
-    """Where the other camera sees what this one sees along unit rays, less where this one does; pixels, NaN where either has no image.
+    """Where the other camera sees what this one sees along unit rays, less where this one does; pixels, NaN
+    where either has no image.
 
     Args:
         rays: of the places that are asked for.

@@ -1,17 +1,18 @@
-"""Every view left out once, by one linear step each: held-out residuals, the camera's scatter over views, each view's influence.
+"""Every view left out once, by one linear step each: held-out residuals, the camera's scatter over views,
+each view's influence.
 
 With the fit linearised (linearised.py), leaving view j out moves what all views share by
 
     d_j = (H - A_j'A_j)^-1 A_j' e_j = H^-1 A_j' (I - B_j)^-1 e_j,      B_j = A_j H^-1 A_j',
 
 the weights of robust loss and priors held; the view's residual, its pose fitted again, is then
-e_j + A_j d_j = (I - B_j)^-1 e_j.  (I - B_j) y = e_j is solved for all views at once by conjugate gradients: its
-eigenvalues are 1 but for what the view itself decides.
+e_j + A_j d_j = (I - B_j)^-1 e_j.  (I - B_j) y = e_j is solved for all views at once by conjugate gradients:
+its eigenvalues are 1 but for what the view itself decides.
 
-The scatter of the d_j is the jackknife's covariance: it takes a view, not a corner, for the independent draw, and so
-holds where errors within a view are alike, where boards bend and where cameras breathe.
-J. Tukey, Bias and confidence in not quite large samples, Ann. Math. Stat. 29, 1958; R. Cook and S. Weisberg, Residuals
-and influence in regression, 1982, chapter 3 (a case left out by one step).
+The scatter of the d_j is the jackknife's covariance: it takes a view, not a corner, for the independent draw,
+and so holds where errors within a view are alike, where boards bend and where cameras breathe.
+J. Tukey, Bias and confidence in not quite large samples, Ann. Math. Stat. 29, 1958; R. Cook and S. Weisberg,
+Residuals and influence in regression, 1982, chapter 3 (a case left out by one step).
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ class LeaveOneOut:
     Args:
         changes: (m,q) of what views share (linearised.py has the order), from the full fit to the one without
             view j; NaN where the other views cannot tell.
-        residuals: (m,2p) of view j by the fit without it, pixels, predicted minus detected, not weighted, its pose
-            fitted by least squares; u of all corners, then v; 0 where a corner was not seen, NaN where the others cannot tell.
+        residuals: (m,2p) of view j by the fit without it, pixels, predicted minus detected, not weighted, its
+            pose fitted by least squares; u of all corners, then v; 0 where a corner was not seen, NaN where
+            the others cannot tell.
         of_camera: how many of the changes, the first, are the camera's.
     """
 
@@ -53,7 +55,9 @@ class LeaveOneOut:
 
     @property
     def scatter(self) -> Float[ndarray, "m d"]:
-        """Rows whose products sum to the jackknife's covariance of the camera: scatter' scatter; NaN where a change is."""
+        """Rows whose products sum to the jackknife's covariance of the camera: scatter' scatter; NaN where a
+        change is.
+        """
         return scattered(self.changes[:, : self.of_camera])
 
 
@@ -69,7 +73,9 @@ def leave_one_out(fit: Linearised) -> LeaveOneOut:
 
 
 def scattered(changes: Float[ndarray, "m d"]) -> Float[ndarray, "m d"]:
-    """Changes by leaving each view out, about their mean and scaled: their products sum to the jackknife's covariance."""
+    """Changes by leaving each view out, about their mean and scaled: their products sum to the jackknife's
+    covariance.
+    """
     known = np.isfinite(changes).all(1)
     m = max(int(known.sum()), 1)
     return np.sqrt((m - 1) / m) * (changes - changes[known].sum(0) / m)

@@ -1,16 +1,18 @@
 """A finished fit as linear algebra: how the residuals of each view move with what all views share.
 
-At the minimum of   sum over views of |W_j^(1/2) e_j|^2 + x'L x   the unknowns are x (camera, displacement of the lens,
-surface and single corners of the target) and one pose for each view.  With the pose of its own view fitted to it,
-a small change of x moves the weighted residual of view j by
+At the minimum of   sum over views of |W_j^(1/2) e_j|^2 + x'L x   the unknowns are x (camera, displacement of
+the lens, surface and single corners of the target) and one pose for each view.  With the pose of its own view
+fitted to it, a small change of x moves the weighted residual of view j by
 
-    A_j x,      A_j = (I - P_j P_j^+) W_j^(1/2) J_j,      P_j = W_j^(1/2) d e_j / d pose_j,   J_j = d e_j / d x,
+    A_j x,      A_j = (I - P_j P_j^+) W_j^(1/2) J_j,      P_j = W_j^(1/2) d e_j / d pose_j,   J_j = d e_j / d
+    x,
 
-and H = sum A_j'A_j + L is what the data and the priors know of x together.  No A_j is ever formed: J_j has a few
-dense columns for the camera, one matrix of spline values for both coordinates, and three columns for each corner
-that only this corner's rows know; products with A_j and A_j' are enough for all that is asked (leave_one_out.py).
-The order of x: the camera's k named parameters, the displacement's g coefficients along x, then g along y, three for
-each polynomial of the surface, three for each corner.
+and H = sum A_j'A_j + L is what the data and the priors know of x together.  No A_j is ever formed: J_j has a
+few dense columns for the camera, one matrix of spline values for both coordinates, and three columns for each
+corner that only this corner's rows know; products with A_j and A_j' are enough for all that is asked
+(leave_one_out.py).
+The order of x: the camera's k named parameters, the displacement's g coefficients along x, then g along y,
+three for each polynomial of the surface, three for each corner.
 Rows of a view are the corners of the whole target, u first and then v, 0 where a corner was not seen.
 """
 
@@ -21,7 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.solve.least_squares import NormalEquations
 
@@ -39,7 +41,8 @@ class Slopes:
         camera: (m,k,2p) by the camera's named parameters.
         pose: (m,6,2p) by the pose of the view.
         spline: (m,p,g) value of each spline of the lens's displacement at each corner; g = 0 for a formula.
-        corner: (m,p,2,3) pixels per metre, by the place of each corner in the target's frame; p = 0 there where the target is flat.
+        corner: (m,p,2,3) pixels per metre, by the place of each corner in the target's frame; p = 0 there
+            where the target is flat.
         surface: (p,r) what the surface's coefficients multiply; r = 0 where there is none.
         plane: (2,2) d pixel / d distorted place.
     """
@@ -69,7 +72,8 @@ class Linearised:
         residual: (m,2p) predicted minus detected, pixels, not weighted.
         root: (m,2p) root of each row's weight, of the robust loss; 0 where a corner was not seen.
         spline_precision: (g,g), the block of L that the displacement has for x, and again for y.
-        shape_precision: (3r + 3p,), the diagonal of L for surface and single corners; L is 0 for the camera's parameters.
+        shape_precision: (3r + 3p,), the diagonal of L for surface and single corners; L is 0 for the camera's
+            parameters.
         noise: px^2 of a coordinate.
         normal: the solver's sums at the estimate, priors included.
         by_corner: whether single corners were eliminated in them; else the views.
@@ -112,14 +116,19 @@ class Linearised:
         """The same fit, which all its views made, with the rows of some of them."""
         slopes = self.slopes
         kept = replace(
-            slopes, camera=slopes.camera[rows], pose=slopes.pose[rows], spline=slopes.spline[rows], corner=slopes.corner[rows]
+            slopes,
+            camera=slopes.camera[rows],
+            pose=slopes.pose[rows],
+            spline=slopes.spline[rows],
+            corner=slopes.corner[rows],
         )
         some = replace(self, slopes=kept, residual=self.residual[rows], root=self.root[rows])
         some.__dict__.update(_covariance=self._covariance, _inverse_blocks=self._inverse_blocks)
         return some
 
     def without_pose(self, rows: ndarray, *, weighted: bool = True) -> ndarray:
-        """What is left of changes (m,2p) or (m,2p,c) of the weighted residuals when each view's pose has been fitted.
+        """What is left of changes (m,2p) or (m,2p,c) of the weighted residuals when each view's pose has been
+        fitted.
 
         Args:
             weighted: False for residuals that are not weighted, each corner then counting alike.
@@ -148,7 +157,9 @@ class Linearised:
         return moved
 
     def changes_by_shape(self, corner: Float[ndarray, "m p 2 3"], x: ndarray) -> Float[ndarray, "m n c"]:
-        """The like of `changes` for the target's shape alone, with other slopes by the places of its corners."""
+        """The like of `changes` for the target's shape alone, with other slopes by the places of its
+        corners.
+        """
         pairs = corner @ self._displaced(x[..., self.of_camera :, :])  # (m, p, 2, c)
         return np.concatenate([pairs[:, :, 0], pairs[:, :, 1]], axis=1)
 
@@ -175,8 +186,12 @@ class Linearised:
             out[:, self.of_camera :] = self._gathered_by_shape(self.slopes.corner, rows)
         return out
 
-    def gathered_by_shape(self, corner: Float[ndarray, "m p 2 3"], rows: Float[ndarray, "m n c"]) -> Float[ndarray, "m q c"]:
-        """The like of `gathered` for the target's shape alone, with other slopes by the places of its corners."""
+    def gathered_by_shape(
+        self, corner: Float[ndarray, "m p 2 3"], rows: Float[ndarray, "m n c"]
+    ) -> Float[ndarray, "m q c"]:
+        """The like of `gathered` for the target's shape alone, with other slopes by the places of its
+        corners.
+        """
         out = np.zeros((len(rows), self.unknowns, rows.shape[2]))
         out[:, self.of_camera :] = self._gathered_by_shape(corner, rows)
         return out
@@ -225,7 +240,8 @@ class Linearised:
     def prior_covariance(self) -> Float[ndarray, "d d"]:
         """The part of `camera_covariance` that the priors' own scatter is: noise H^-1 L H^-1.
 
-        The rest, noise H^-1 (sum A'A) H^-1, is how the estimate scatters when the same photographs are taken again.
+        The rest, noise H^-1 (sum A'A) H^-1, is how the estimate scatters when the same photographs are taken
+        again.
         """
         k, g, _, _ = self.slopes.sizes
         columns = self.camera_columns
@@ -242,7 +258,9 @@ class Linearised:
         columns, lead = x.shape[-1], x.shape[:-2]
         out = np.zeros((*lead, c, SPACE, columns))
         if r:
-            out += (self.slopes.surface @ x[..., : SPACE * r, :].reshape(*lead, r, SPACE * columns)).reshape(out.shape)
+            out += (self.slopes.surface @ x[..., : SPACE * r, :].reshape(*lead, r, SPACE * columns)).reshape(
+                out.shape
+            )
         if self.single:
             out += x[..., SPACE * r :, :].reshape(out.shape)
         return out

@@ -1,16 +1,19 @@
 """How a camera scatters: what its own fit says of it, and what leaving views out says.
 
-Four covariances of a camera's unknowns (its named parameters, then its displacement's coefficients), all of them by one linear step:
+Four covariances of a camera's unknowns (its named parameters, then its displacement's coefficients), all of
+them by one linear step:
 
 model      independent errors of corners, and the priors' own scatter: noise H^-1
 prior      the second of these alone: noise H^-1 L H^-1
-alike      `model`, with errors that are alike within a view: smooth patterns of order 2, 3 and 4 over the board count tau_o times, as often
-           as they are larger in the residuals than independent errors make them
-jackknife  from how the camera moves when each view is left out (leave_one_out.py); it sees what lives in the camera itself, such as
-           a focal length that breathes, and boards that bend from view to view
+alike      `model`, with errors that are alike within a view: smooth patterns of order 2, 3 and 4 over the
+           board count tau_o times, as often as they are larger in the residuals than independent errors make
+           them
+jackknife  from how the camera moves when each view is left out (leave_one_out.py); it sees what lives in the
+           camera itself, such as a focal length that breathes, and boards that bend from view to view
 
-`alike` knows independent errors best and few views well; the jackknife holds whatever the errors are, but leaves out what no view can
-show, so the priors' part is added to it.  Neither is ever too large by much, so the larger of the two is believed (camera_error.py).
+`alike` knows independent errors best and few views well; the jackknife holds whatever the errors are, but
+leaves out what no view can show, so the priors' part is added to it.  Neither is ever too large by much, so
+the larger of the two is believed (camera_error.py).
 """
 
 from __future__ import annotations
@@ -29,9 +32,14 @@ from orthoscope.models.target_shape import polynomials
 
 __all__ = ["ORDERS", "Scatter", "likenesses", "patterns_over_views", "scatter_of"]
 
-ORDERS = (2, 3, 4)  # of patterns over a board: a pose takes those below, and of those above errors are as good as independent
+ORDERS = (
+    2,
+    3,
+    4,
+)  # of patterns over a board: a pose takes those below, and of those above errors are as good as independent
 ENOUGH = 40  # views that tell how alike errors are
-THIN = 1e-6  # of a pattern's length: what is left of it after pose and patterns before it is rounding when it is no more
+# of a pattern's length: what is left of it after pose and patterns before it is rounding when it is no more
+THIN = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +48,11 @@ class Scatter:
 
     Args:
         camera: where its fit ended.
-        names: of its k parameters that moved; the displacement's coefficients, along x and then along y, come after them.
+        names: of its k parameters that moved; the displacement's coefficients, along x and then along y, come
+            after them.
         model, alike, prior: (d,d) covariances.
-        left_out: (m,d) rows whose products sum to the jackknife's covariance; NaN for views that the others cannot tell.
+        left_out: (m,d) rows whose products sum to the jackknife's covariance; NaN for views that the others
+            cannot tell.
     """
 
     camera: Camera
@@ -84,20 +94,23 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
             by_camera = fit.camera_columns.T @ some.pulls(rows).transpose(1, 0, 2).reshape(fit.unknowns, -1)
             camera += (larger - 1.0) * by_camera @ by_camera.T
     alike = fit.camera_covariance + fit.noise * fit.views / some.views * camera
-    return Scatter(fit.camera, fit.names, fit.camera_covariance, alike, fit.prior_covariance, left_out.scatter)
+    return Scatter(
+        fit.camera, fit.names, fit.camera_covariance, alike, fit.prior_covariance, left_out.scatter
+    )
 
 
 def patterns_over_views(
     fit: Linearised, points: Float[ndarray, "p 3"], *, orders: Sequence[int] = ORDERS
 ) -> list[Float[ndarray, "m n c"]]:
-    """Smooth patterns over the board, in u and in v, as weighted residuals of each view: orthonormal, pose and lower orders taken out.
+    """Smooth patterns over the board, in u and in v, as weighted residuals of each view: orthonormal, pose
+    and lower orders taken out.
 
     Args:
         points: the target's corners, nominal.
     Returns:
         For each order its patterns; those that a view's corners cannot show are 0 there.
     """
-    seen = (fit.root[:, : len(points)] > 0).any(0)
+    seen = np.any(fit.root[:, : len(points)] > 0, axis=0)
     columns, sizes = [], []
     for order in orders:
         smooth = polynomials(points, seen, orders=(order,))
@@ -113,7 +126,9 @@ def patterns_over_views(
 
 
 def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "m n c"]]) -> tuple[float, ...]:
-    """tau_o, 1 or more: how much larger each order's patterns are in the residuals than independent errors would make them."""
+    """tau_o, 1 or more: how much larger each order's patterns are in the residuals than independent errors
+    would make them.
+    """
     found = []
     for rows in patterns:
         in_residuals = ((fit.errors[:, None] @ rows) ** 2).sum()

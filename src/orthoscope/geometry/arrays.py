@@ -1,6 +1,6 @@
 """Arrays at the border: checked, converted to float64, frozen; and the two errors that everything raises.
 
-Floor 0.  `Float["n 2"]` and its kin annotate shapes.  They are jaxtyping's where jaxtyping has been imported first (the
+`Float["n 2"]` and its kin annotate shapes.  They are jaxtyping's where jaxtyping has been imported first (the
 tests do, and beartype then checks every call); otherwise they are plain arrays, so a user pays nothing.
 """
 
@@ -41,12 +41,18 @@ def frozen(values: Any, shape: tuple[int | None, ...], name: str, dtype: type = 
     try:
         array = np.array(values, dtype=dtype)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} is not an array of numbers ({error}). Hand in shape {_shape(shape)}.") from error
-    if array.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
+        raise InputError(
+            f"{name} is not an array of numbers ({error}). Hand in shape {_shape(shape)}."
+        ) from error
+    if array.ndim != len(shape) or any(
+        want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
+    ):
         raise InputError(f"{name} has shape {_shape(array.shape)}; expected {_shape(shape)}.")
     if not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(f"{name} has {array[place]} at {list(place)}; expected finite numbers. Drop that entry.")
+        raise InputError(
+            f"{name} has {array[place]} at {list(place)}; expected finite numbers. Drop that entry."
+        )
     array.setflags(write=False)
     return array
 

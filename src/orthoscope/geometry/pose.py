@@ -1,7 +1,7 @@
 """Rotations and rigid motions: one `Pose` for users, stacks of matrices for the mathematics.
 
-Floor 0.  A rotation vector w is axis times angle; exp(w) its matrix (Rodrigues).  Steps are taken on the left,
-R <- exp(w) R, so that d(R p)/dw = -[R p]_x at w = 0.  After J. Sola et al., A micro Lie theory, arXiv:1812.01537.
+A rotation vector w is axis times angle; exp(w) its matrix (Rodrigues). Steps are taken on the left, R <-
+exp(w) R, so that d(R p)/dw = -[R p]_x at w = 0. After J. Sola et al., A micro Lie theory, arXiv:1812.01537.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 
 __all__ = ["Pose", "nearest_rotation", "rotation_from_vector", "vector_from_rotation"]
 
-CROSS = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=float)  # [e_i]_x, flat
+CROSS = np.array(
+    [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=float
+)  # [e_i]_x, flat
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,9 @@ class Pose:
     def __post_init__(self) -> None:
         rotation = frozen(self.rotation, (3, 3), "rotation")
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
-            raise InputError("rotation is not orthonormal with determinant +1; hand in a proper rotation matrix.")
+            raise InputError(
+                "rotation is not orthonormal with determinant +1; hand in a proper rotation matrix."
+            )
         object.__setattr__(self, "rotation", rotation)
         object.__setattr__(self, "translation", frozen(self.translation, (3,), "translation"))
 
@@ -49,14 +53,22 @@ class Pose:
 
 
 def rotation_from_vector(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3 3"]:
-    """Rodrigues: rotation matrices of rotation vectors (radians): I + sin(a)/a [v]_x + (1 - cos a)/a^2 [v]_x^2, a = |v|."""
+    """Rodrigues: rotation matrices of rotation vectors (radians): I + sin(a)/a [v]_x + (1 - cos a)/a^2
+    [v]_x^2, a = |v|.
+    """
     angle = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
     cross = cross_matrix(vectors)
-    return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * (cross @ cross)
+    return (
+        np.eye(3)
+        + np.sinc(angle / np.pi) * cross
+        + 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * (cross @ cross)
+    )
 
 
 def vector_from_rotation(rotation: Float[ndarray, "3 3"]) -> Float[ndarray, "3"]:
-    """The rotation vector, length in [0, pi], of one rotation matrix; by way of the unit quaternion, stable at pi."""
+    """The rotation vector, length in [0, pi], of one rotation matrix; by way of the unit quaternion, stable
+    at pi.
+    """
     w, axis = _quaternion(rotation)
     sine = np.linalg.norm(axis)
     return (2.0 if sine < 1e-12 else 2.0 * np.arctan2(sine, w) / sine) * axis

@@ -1,11 +1,13 @@
 """The projective plane: homographies for all views at once, fitted lines, cross-ratios.
 
-Floor 0.  A plane point p = (X, Y, 1) is seen along ray r where r x (H p) = 0.  Stacked over the corners of a view, the
-normal matrix of these equations is  sum (|r|^2 I - r r^T) (x) (p p^T), 9 by 9; H is its last eigenvector.  Rays may lie past
-90 degrees.  Pixels are the rays (u, v, 1) after Hartley's normalisation (R. Hartley, In defense of the eight-point
-algorithm, TPAMI 19(6), 1997).  Views are padded to one length; weight 0 marks padding.
+A plane point p = (X, Y, 1) is seen along ray r where r x (H p) = 0. Stacked over the corners of a view, the
+normal matrix of these equations is  sum (|r|^2 I - r r^T) (x) (p p^T), 9 by 9; H is its last eigenvector.
+Rays may lie past 90 degrees. Pixels are the rays (u, v, 1) after Hartley's normalisation (R. Hartley, In
+defense of the eight-point algorithm, TPAMI 19(6), 1997). Views are padded to one length; weight 0 marks
+padding.
 
-What every projection keeps: points of a line stay on a line, and the cross-ratio of four of them (the paper's eq. 5 and 6) stays
+What every projection keeps: points of a line stay on a line, and the cross-ratio of four of them (the paper's
+eq. 5 and 6) stays
     CR = |p1 p3| |p2 p4| / (|p1 p4| |p2 p3|),   4/3 for four equally spaced points.
 """
 
@@ -17,9 +19,18 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["FittedLines", "cross_ratio", "cross_ratio_slope", "fitted_lines", "homographies_to_pixels", "homographies_to_rays"]
+__all__ = [
+    "FittedLines",
+    "cross_ratio",
+    "cross_ratio_slope",
+    "fitted_lines",
+    "homographies_to_pixels",
+    "homographies_to_rays",
+]
 
-SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # where the entries of a symmetric 3x3 matrix stand among its six
+SYMMETRIC = np.array(
+    [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
+)  # where the entries of a symmetric 3x3 matrix stand among its six
 VIEWS_AT_ONCE = 15  # so that the intermediate arrays stay in the processor's cache
 
 
@@ -38,12 +49,17 @@ def homographies_to_rays(
 
 
 def _homographies(points: ndarray, rays: ndarray, weights: ndarray) -> ndarray:
-    """`homographies_to_rays` of some views, not scaled; both factors of the normal matrix are symmetric, so six sums stand for nine."""
+    """`homographies_to_rays` of some views, not scaled; both factors of the normal matrix are symmetric, so
+    six sums stand for nine.
+    """
     normalised, plane_from_target = _hartley(points, weights)
     (X, Y), (x, y, z) = np.moveaxis(normalised, -1, 0), np.moveaxis(rays, -1, 0)
     one = np.ones_like(X)
     pp = np.stack([X * X, X * Y, X, Y * Y, Y, one], axis=1)
-    rr = np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y], axis=1) * weights[:, None]
+    rr = (
+        np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y], axis=1)
+        * weights[:, None]
+    )
     sums = rr @ pp.transpose(0, 2, 1)
     normal = sums[:, SYMMETRIC[:, None, :, None], SYMMETRIC[None, :, None, :]].reshape(-1, 9, 9)
     h = np.linalg.eigh(normal)[1][:, :, 0].reshape(-1, 3, 3)
@@ -54,7 +70,9 @@ def _homographies(points: ndarray, rays: ndarray, weights: ndarray) -> ndarray:
 def homographies_to_pixels(
     points: Float[ndarray, "v n 2"], pixels: Float[ndarray, "v n 2"], weights: Float[ndarray, "v n"]
 ) -> Float[ndarray, "v 3 3"]:
-    """H of each view from the target's plane (metres) to pixels, scaled to |H| = 1, third coordinate positive."""
+    """H of each view from the target's plane (metres) to pixels, scaled to |H| = 1, third coordinate
+    positive.
+    """
     normalised, plane_from_pixels = _hartley(pixels, weights)
     rays = np.concatenate([normalised, np.ones_like(normalised[..., :1])], axis=-1)
     h = np.linalg.solve(plane_from_pixels, homographies_to_rays(points, rays, weights))
@@ -64,8 +82,9 @@ def homographies_to_pixels(
 class FittedLines(NamedTuple):
     """The line nearest to each set of points: through `middle` along the unit vector `direction`.
 
-    along, across: place of each point on the line and its signed distance from it, to the side of (-direction_y, direction_x).  gap: the
-    difference of the two sums of squares; 0 where the points have no direction.
+    along, across: place of each point on the line and its signed distance from it, to the side of
+    (-direction_y, direction_x). gap: the difference of the two sums of squares; 0 where the points have no
+    direction.
     """
 
     middle: Float[ndarray, "*batch 2"]
@@ -76,7 +95,9 @@ class FittedLines(NamedTuple):
 
 
 def fitted_lines(points: Float[ndarray, "*batch n 2"], weights: Float[ndarray, "*batch n"]) -> FittedLines:
-    """The line with the least sum of squared distances from its points, for every set of the stack; weight 0 marks padding."""
+    """The line with the least sum of squared distances from its points, for every set of the stack; weight 0
+    marks padding.
+    """
     middle = (weights[..., None] * points).sum(-2) / weights.sum(-1)[..., None]
     x, y = np.moveaxis(points - middle[..., None, :], -1, 0)
     more, mixed = (weights * (x * x - y * y)).sum(-1), 2.0 * (weights * x * y).sum(-1)
@@ -88,11 +109,17 @@ def fitted_lines(points: Float[ndarray, "*batch n 2"], weights: Float[ndarray, "
 
 def cross_ratio(points: Float[ndarray, "*batch 4 2"]) -> Float[ndarray, "*batch"]:
     """CR of four points in their order along a line."""
-    return _distance(points, 0, 2) * _distance(points, 1, 3) / (_distance(points, 0, 3) * _distance(points, 1, 2))
+    return (
+        _distance(points, 0, 2)
+        * _distance(points, 1, 3)
+        / (_distance(points, 0, 3) * _distance(points, 1, 2))
+    )
 
 
 def cross_ratio_slope(points: Float[ndarray, "*batch 4 2"]) -> Float[ndarray, "*batch 4 2"]:
-    """Derivative of `cross_ratio` by each coordinate; as a formula of distances it goes on where the points leave their line."""
+    """Derivative of `cross_ratio` by each coordinate; as a formula of distances it goes on where the points
+    leave their line.
+    """
     slope = np.zeros_like(points)
     for i, j, sign in ((0, 2, 1.0), (1, 3, 1.0), (0, 3, -1.0), (1, 2, -1.0)):
         by_i = sign * (points[..., i, :] - points[..., j, :]) / _distance(points, i, j)[..., None] ** 2
@@ -105,7 +132,9 @@ def _distance(points: Float[ndarray, "*batch 4 2"], i: int, j: int) -> Float[nda
     return np.hypot(points[..., i, 0] - points[..., j, 0], points[..., i, 1] - points[..., j, 1])
 
 
-def _hartley(plane: Float[ndarray, "v n 2"], weights: Float[ndarray, "v n"]) -> tuple[Float[ndarray, "v n 2"], Float[ndarray, "v 3 3"]]:
+def _hartley(
+    plane: Float[ndarray, "v n 2"], weights: Float[ndarray, "v n"]
+) -> tuple[Float[ndarray, "v n 2"], Float[ndarray, "v 3 3"]]:
     """The points with mean 0 and mean squared radius 2, and the matrix that took them there."""
     total = np.maximum(weights.sum(-1), 1e-300)[:, None]
     centre = (weights[..., None] * plane).sum(1) / total

@@ -1,6 +1,7 @@
 """Methods that make a calibration from detections, by name.
 
-Floor 3.  Each is a function in a file of its own that has its name, loaded when it is first asked for: one calibration takes one method.
+Each is a function in a file of its own that has its name, loaded when it is first asked for: one calibration
+takes one method.
 """
 
 from __future__ import annotations
@@ -11,15 +12,17 @@ from collections import UserDict
 from collections.abc import Callable
 from typing import Any
 
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import InputError
-from orthoscope.geometry.target import Detections
-from orthoscope.methods.calibration import Calibration
+from orthoscope.targets.detections import Detections
 
 __all__ = ["METHODS", "calibrate", "settings_of"]
 
 
 class _Methods(UserDict[str, Any]):
-    """Functions by name; what stands in the table is the function, or the name of its file until it is asked for."""
+    """Functions by name; what stands in the table is the function, or the name of its file until it is asked
+    for.
+    """
 
     def __getitem__(self, name: str) -> Callable[..., Calibration]:
         if isinstance(self.data[name], str):
@@ -27,13 +30,22 @@ class _Methods(UserDict[str, Any]):
         return self.data[name]
 
 
-METHODS = _Methods({name: f"{__name__}.{name}" for name in ("decoupled", "fccm", "mldc", "nmldc")})
+METHODS = _Methods(
+    {
+        "decoupled": f"{__name__}.decoupled.decoupled",
+        "fccm": f"{__name__}.fccm",
+        "mldc": f"{__name__}.mldc.mldc",
+        "nmldc": f"{__name__}.mldc.nmldc",
+    }
+)
 
 
 def calibrate(detections: Detections, *, method: str = "decoupled", **settings: Any) -> Calibration:
-    """Calibrate a camera from detections by a method of METHODS; its settings are the method's own (lens, skew, loss, ...).
+    """Calibrate a camera from detections by a method of METHODS; its settings are the method's own (lens,
+    skew, loss, ...).
 
-    Raises CalibrationError where the views cannot tell the camera, InputError for a method or a setting that is none.
+    Raises CalibrationError where the views cannot tell the camera, InputError for a method or a setting that
+    is none.
     """
     known = settings_of(method)
     if unknown := sorted(set(settings) - set(known)):

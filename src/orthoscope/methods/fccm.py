@@ -1,9 +1,11 @@
 """Full calibration (FCCM), the paper's first peer: pin-hole, lens and poses in one least-squares problem.
 
-Floor 3.  Steps as in Zhang's section 3, for any lens of LENSES, partial boards and lenses past 90 degrees (start.py):
-1. a homography for each view; 2. K in closed form, or an equidistant lens; 3. poses; 4. everything together, Levenberg-Marquardt.
-Steps 1 to 3 and the first part of 4 look at a sample of each view's corners: most of the way is gone for a fraction of the work.
-Z. Zhang, A flexible new technique for camera calibration, TPAMI 22(11), 2000.
+Steps as in Zhang's section 3, for any lens of LENSES, partial boards and lenses past 90 degrees
+(initial_camera.py):
+1. a homography for each view; 2. K in closed form, or an equidistant lens; 3. poses; 4. everything together,
+   Levenberg-Marquardt. Steps 1 to 3 and the first part of 4 look at a sample of each view's corners: most of
+   the way is gone for a fraction of the work. Z. Zhang, A flexible new technique for camera calibration,
+   TPAMI 22(11), 2000.
 """
 
 from __future__ import annotations
@@ -13,27 +15,32 @@ from dataclasses import replace
 
 import numpy as np
 
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.identifiability import check_enough, check_known, told
+from orthoscope.fitting.initial_camera import Assumptions, StartingCameras, starts, suited_lens
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
-from orthoscope.geometry.target import Detections
-from orthoscope.methods.calibration import Calibration
-from orthoscope.methods.determinacy import check_enough, check_known, told
-from orthoscope.methods.observations import Observations
-from orthoscope.methods.reprojection import Estimate, Reprojection
-from orthoscope.methods.screening import screened
-from orthoscope.methods.start import Bases, Narrowing, starts, suited_lens
 from orthoscope.models.lenses import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
 from orthoscope.solve.losses import LOSSES, Loss
+from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__
 
 __all__ = ["fccm"]
 
 AUTO = "auto"
-TOLERANCE = 1e-10  # share of the cost; of a million numbers that is 1e-4 of one's variance: nothing known moves by 1 % of its deviation
+# share of the cost; of a million numbers that is 1e-4 of one's variance: nothing known moves by 1 % of its
+# deviation
+TOLERANCE = 1e-10
 SAMPLE = 64  # corners of each view that are enough to come near the minimum
 NEARLY = Options(max_steps=50, tolerance=1e-3, trusting=True)
-FIRM = 5  # coefficients of a lens, the first, that such a sample tells; a denominator's would start in a valley of the sample's own
-ADEQUATE = 0.003  # an rms below this share of the diagonal is a minimum worth having; above it the other start is tried too
+# coefficients of a lens, the first, that such a sample tells; a denominator's would start in a valley of the
+# sample's own
+FIRM = 5
+# an rms below this share of the diagonal is a minimum worth having; above it the other start is tried too
+ADEQUATE = 0.003
 LONG_WALK = 25  # steps; so many speak of a flat valley, and where corners are FEW there are often others
 FEW = 2000  # corners
 
@@ -50,23 +57,26 @@ def fccm(
 ) -> Calibration:
     """Calibrate pin-hole, lens and poses jointly (Zhang's full calibration; the paper's FCCM).
 
-    lens: a name of LENSES, or with the coefficients to free, `brown:k1,k2`; `auto` takes brown, or kannala_brandt for wide views.
-    skew: whether K has one.  loss, loss_scale: a name of LOSSES and where it starts to matter, pixels.  progress: called after each step
-    with (step, cost).
-    Raises CalibrationError where the views cannot tell the camera, InputError for a setting that is none.
+    lens: a name of LENSES, or with the coefficients to free, `brown:k1,k2`; `auto` takes brown, or
+    kannala_brandt for wide views. skew: whether K has one. loss, loss_scale: a name of LOSSES and where it
+    starts to matter, pixels. progress: called after each step with (step, cost). Raises CalibrationError
+    where the views cannot tell the camera, InputError for a setting that is none.
     """
     if loss not in LOSSES:
         raise InputError(f"loss {loss!r} is not known; expected one of {', '.join(LOSSES)}.")
-    used = screened(detections)
-    narrowing = Narrowing.of(len(used.views), skew=skew)
+    used = with_usable_views(detections)
+    narrowing = Assumptions.of(len(used.views), skew=skew)
     observations = Observations.of(used)
     sample = observations.thinned(SAMPLE)
-    bases = Bases(sample, used.target.points, used.image_size, narrowing)
+    bases = StartingCameras(sample, used.target.points, used.image_size, narrowing)
     lens = suited_lens(bases) if lens == AUTO else lens
     kind, coefficients = parse_lens(lens)
     free = (*narrowing.free, *coefficients)
     check_enough(used, free)
-    cost, options = LOSSES[loss](loss_scale), Options(max_steps=max_steps, tolerance=TOLERANCE, trusting=True, progress=progress)
+    cost, options = (
+        LOSSES[loss](loss_scale),
+        Options(max_steps=max_steps, tolerance=TOLERANCE, trusting=True, progress=progress),
+    )
     estimates = starts(bases, kind, coefficients=coefficients)
     if sample is not observations:
         estimates = [_nearer(estimate, bases, free, cost) for estimate in estimates]
@@ -88,22 +98,33 @@ def fccm(
     )
 
 
-def _nearer(start: Estimate, bases: Bases, free: tuple[str, ...], loss: Loss) -> Estimate:
+def _nearer(start: Estimate, bases: StartingCameras, free: tuple[str, ...], loss: Loss) -> Estimate:
     """A start brought near the minimum on the bases' sample of corners, with the parameters that it tells."""
     firm = [name for name in free if name not in start.camera.lens.names()[FIRM:]]
-    return solve(Reprojection(bases.observations, bases.points, start.camera, firm), start, loss=loss, options=NEARLY).unknowns
+    return solve(
+        Reprojection(bases.observations, bases.points, start.camera, firm), start, loss=loss, options=NEARLY
+    ).unknowns
 
 
 def _best(
-    estimates: list[Estimate], observations: Observations, used: Detections, free: tuple[str, ...], loss: Loss, options: Options
+    estimates: list[Estimate],
+    observations: Observations,
+    used: Detections,
+    free: tuple[str, ...],
+    loss: Loss,
+    options: Options,
 ) -> Solution[Estimate]:
-    """The joint refinement from the first start that ends well and without a long walk, or else the best of all."""
+    """The joint refinement from the first start that ends well and without a long walk, or else the best of
+    all.
+    """
     best: Solution[Estimate] | None = None
     enough = used.corners * float(loss.cost(np.array((ADEQUATE * np.hypot(*used.image_size)) ** 2)))
     for estimate in estimates:
         problem = Reprojection(observations, used.target.points, estimate.camera, free)
         solution = solve(problem, estimate, loss=loss, options=options)
-        if estimate.camera.lens.scaled_by:  # at the minimum already: this only expresses it, and its covariance, by K's scale
+        if (
+            estimate.camera.lens.scaled_by
+        ):  # at the minimum already: this only expresses it, and its covariance, by K's scale
             camera, poses = solution.unknowns
             scaled = solve(problem, Estimate(camera.with_unit_scale(), poses), loss=loss, options=options)
             solution = replace(scaled, steps=solution.steps + scaled.steps)
@@ -120,7 +141,9 @@ def _no_start(estimate: Estimate, observations: Observations, used: Detections) 
     """What to say where no start leads anywhere: which views the likeliest one cannot see."""
     e = Reprojection(observations, used.target.points, estimate.camera).residuals(estimate)
     lost = np.sort(observations.order[np.isnan(e).any((1, 2))])
-    names = ", ".join(used.views[i].image for i in lost[:5]) + (f" and {len(lost) - 5} more" if len(lost) > 5 else "")
+    names = ", ".join(used.views[i].image for i in lost[:5]) + (
+        f" and {len(lost) - 5} more" if len(lost) > 5 else ""
+    )
     return (
         f"no camera sees the target as it is in {names}: some of its corners would be behind the camera. "
         "Check the target's columns and rows and the order of the corners, or leave these photographs out."

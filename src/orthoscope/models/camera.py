@@ -1,8 +1,9 @@
 """The pin-hole with its lens: Intrinsics, Camera, and the maps that straighten photographs.
 
-Floor 1.  K = [fx skew cx; 0 fy cy; 0 0 1] (the paper's A = [alpha gamma u0; 0 beta v0; 0 0 1]).  A point becomes a ray, a place in the
-lens's chart, a distorted place, a pixel (docs/conventions.md).  With a lens frame L the ray is turned by L^-1 K first and L
-takes the place of K at the end: the lens then acts about its own distortion centre.
+K = [fx skew cx; 0 fy cy; 0 0 1] (the paper's A = [alpha gamma u0; 0 beta v0; 0 0 1]). A point becomes a ray,
+a place in the lens's chart, a distorted place, a pixel (docs/conventions.md). With a lens frame L the ray is
+turned by L^-1 K first and L takes the place of K at the end: the lens then acts about its own distortion
+centre.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
-from orthoscope.models.blocks import in_blocks
+from orthoscope.models.chunks import in_blocks
 from orthoscope.models.lens import Lens
 from orthoscope.models.smooth_map import smooth_map
 
@@ -35,7 +36,9 @@ class Intrinsics:
     skew: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in zip(("fx", "fy", "cx", "cy", "skew"), frozen(self.as_tuple(), (5,), "intrinsics"), strict=True):
+        for name, value in zip(
+            ("fx", "fy", "cx", "cy", "skew"), frozen(self.as_tuple(), (5,), "intrinsics"), strict=True
+        ):
             object.__setattr__(self, name, float(value))
         if self.fx <= 0 or self.fy <= 0:
             raise InputError(f"focal lengths are {self.fx:g} and {self.fy:g} px; expected positive ones.")
@@ -45,7 +48,9 @@ class Intrinsics:
         return self.fx, self.fy, self.cx, self.cy, self.skew
 
     def after(self, undone: Intrinsics, done: Intrinsics) -> Intrinsics:
-        """The pin-hole that does what `done` does, undoes `undone` and then does this: K times undone^-1 times done."""
+        """The pin-hole that does what `done` does, undoes `undone` and then does this: K times undone^-1
+        times done.
+        """
         if undone is done:
             return self
         (fx, skew, cx), (_, fy, cy), _ = self.matrix @ np.linalg.solve(undone.matrix, done.matrix)
@@ -80,9 +85,9 @@ class Intrinsics:
 class Camera:
     """A calibrated camera.
 
-    image_size: (width, height).  lens_frame: intrinsics of the lens's own plane where its distortion centre is not the principal
-    point; None means the intrinsics themselves.
-    Raises InputError for an image without size.
+    image_size: (width, height). lens_frame: intrinsics of the lens's own plane where its distortion centre is
+    not the principal point; None means the intrinsics themselves. Raises InputError for an image without
+    size.
     """
 
     image_size: tuple[int, int]
@@ -99,21 +104,28 @@ class Camera:
     def project(self, points: Float[ndarray, "n 3"], *, beyond: bool = False) -> Float[ndarray, "n 2"]:
         """Pixels (n,2) of points (n,3) in the camera frame, any unit; NaN where the lens gives them no image.
 
-        beyond: let the formula go on where the lens's domain has ended, as least squares does; such pixels are no images.
+        beyond: let the formula go on where the lens's domain has ended, as least squares does; such pixels
+        are no images.
         """
-        return (self.lens_frame or self.intrinsics).to_pixels(self.lens.distort(self._lens_rays(points), beyond=beyond))
+        return (self.lens_frame or self.intrinsics).to_pixels(
+            self.lens.distort(self._lens_rays(points), beyond=beyond)
+        )
 
     def unproject(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Unit rays (n,3), camera frame, that fall on pixels (n,2); NaN where none does."""
         frame = self.lens_frame or self.intrinsics
-        rays = in_blocks(lambda u, v: self.lens.chart.lift(*self.lens.unwarp(*frame.place(u, v))), pixels, width=3)
+        rays = in_blocks(
+            lambda u, v: self.lens.chart.lift(*self.lens.unwarp(*frame.place(u, v))), pixels, width=3
+        )
         if self.lens_frame is None:
             return rays
         rays = rays @ np.linalg.solve(self.intrinsics.matrix, self.lens_frame.matrix).T
         return rays / np.sqrt((rays * rays).sum(-1, keepdims=True))
 
     def with_unit_scale(self) -> Camera:
-        """The same images, with the lens's own scale (if its formula has one) moved to K: fx, fy then are the scale at the centre."""
+        """The same images, with the lens's own scale (if its formula has one) moved to K: fx, fy then are the
+        scale at the centre.
+        """
         name = self.lens.scaled_by
         if name is None or self.lens_frame is not None:
             return self
@@ -122,8 +134,12 @@ class Camera:
         lens = self.lens.with_coefficients(**{name: getattr(self.lens, name) / scale})
         return replace(self, intrinsics=Intrinsics(scale * fx, scale * fy, cx, cy, scale * skew), lens=lens)
 
-    def undistort_pixels(self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None) -> Float[ndarray, "n 2"]:
-        """Where a pin-hole camera (`straight`, default this camera's own K) would see what these pixels show; NaN where it cannot."""
+    def undistort_pixels(
+        self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None
+    ) -> Float[ndarray, "n 2"]:
+        """Where a pin-hole camera (`straight`, default this camera's own K) would see what these pixels show;
+        NaN where it cannot.
+        """
         frame = self.lens_frame or self.intrinsics
         seen = (straight or self.intrinsics).after(self.intrinsics, frame)
 
@@ -132,33 +148,47 @@ class Camera:
 
         return in_blocks(straighten, pixels, width=2)
 
-    def distort_pixels(self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None) -> Float[ndarray, "n 2"]:
-        """The inverse of `undistort_pixels`: where this camera sees what a pin-hole camera sees at these pixels."""
+    def distort_pixels(
+        self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None
+    ) -> Float[ndarray, "n 2"]:
+        """The inverse of `undistort_pixels`: where this camera sees what a pin-hole camera sees at these
+        pixels.
+        """
         return self.project(_in_front((straight or self.intrinsics).to_plane(pixels)))
 
     def undistort_map(
         self, straight: Intrinsics | None = None, size: tuple[int, int] | None = None
     ) -> tuple[Float[ndarray, "h w"], Float[ndarray, "h w"]]:
-        """For each pixel of the straight image, where to look in the photograph: x and y, float32 as cv2.remap takes them.
+        """For each pixel of the straight image, where to look in the photograph: x and y, float32 as
+        cv2.remap takes them.
 
-        straight, size: intrinsics and (width, height) of the straight image, by default this camera's.  NaN where a ray lies beyond the
-        lens's domain or its image outside the photograph by more than a pixel, so that nothing folds back.
+        straight, size: intrinsics and (width, height) of the straight image, by default this camera's. NaN
+        where a ray lies beyond the lens's domain or its image outside the photograph by more than a pixel, so
+        that nothing folds back.
         """
         size, pin_hole = size or self.image_size, straight or self.intrinsics
 
         def sees_all_up_to(pixels):
             return self.lens.sees_all_up_to(self._lens_rays(_in_front(pin_hole.to_plane(pixels))))
 
-        return smooth_map(lambda pixels: self.distort_pixels(pixels, pin_hole), size, vouched=sees_all_up_to, limits=self.image_size)
+        return smooth_map(
+            lambda pixels: self.distort_pixels(pixels, pin_hole),
+            size,
+            vouched=sees_all_up_to,
+            limits=self.image_size,
+        )
 
     def straight_intrinsics(self, keep: str = "all", widest: float = WIDEST) -> Intrinsics:
-        """A pin-hole for the straight image, same size: `all` keeps every photographed pixel, `valid` only places that were photographed.
+        """A pin-hole for the straight image, same size: `all` keeps every photographed pixel, `valid` only
+        places that were photographed.
 
-        widest: no ray farther than this from the axis (radians) is kept, since a pin-hole stretches it without end.
-        Raises InputError for another word.  The paper: section 4.2, Fig. 7.
+        widest: no ray farther than this from the axis (radians) is kept, since a pin-hole stretches it
+        without end. Raises InputError for another word. The paper: section 4.2, Fig. 7.
         """
         if keep not in ("all", "valid"):
-            raise InputError(f"keep is {keep!r}; expected 'all' (every photographed pixel) or 'valid' (no black border).")
+            raise InputError(
+                f"keep is {keep!r}; expected 'all' (every photographed pixel) or 'valid' (no black border)."
+            )
         border = image_border(self.image_size)
         centre = np.array([[self.intrinsics.cx, self.intrinsics.cy]])
         rays = self._border_rays(border, centre, widest)
@@ -172,13 +202,17 @@ class Camera:
         return Intrinsics(focal[0], focal[1], -focal[0] * low[0], -focal[1] * low[1])
 
     def _lens_rays(self, points: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
-        """Points of the camera frame as the lens meets them: turned about its own distortion centre where it has one."""
+        """Points of the camera frame as the lens meets them: turned about its own distortion centre where it
+        has one.
+        """
         if self.lens_frame is None:
             return points
         return points @ np.linalg.solve(self.lens_frame.matrix, self.intrinsics.matrix).T
 
     def _border_rays(self, border: ndarray, centre: ndarray, widest: float) -> ndarray:
-        """Rays of the image's border; where a border pixel has none within `widest`, of the last pixel towards the centre that has."""
+        """Rays of the image's border; where a border pixel has none within `widest`, of the last pixel
+        towards the centre that has.
+        """
         inside, outside = np.zeros(len(border)), np.ones(len(border))
         for _ in range(40):
             rays = self.unproject(centre + outside[:, None] * (border - centre))
@@ -197,7 +231,9 @@ def image_border(image_size: tuple[int, int], samples: int = 64) -> Float[ndarra
     right, bottom = image_size[0] - 1.0, image_size[1] - 1.0
     t = np.arange(samples) / samples
     corners = np.array([[0, 0], [right, 0], [right, bottom], [0, bottom]])
-    return np.concatenate([a + t[:, None] * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+    return np.concatenate(
+        [a + t[:, None] * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    )
 
 
 def _in_front(plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
@@ -206,7 +242,9 @@ def _in_front(plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
 
 
 def _inner_rectangle(plane: ndarray, aspect: float) -> tuple[ndarray, ndarray]:
-    """A large upright rectangle of the given aspect inside the closed curve `plane`, grown from the curve's middle."""
+    """A large upright rectangle of the given aspect inside the closed curve `plane`, grown from the curve's
+    middle.
+    """
     middle = 0.5 * (plane.min(0) + plane.max(0))
     side = plane - middle
     # the curve meets the rectangle's boundary where max(|x| / aspect, |y|) is least

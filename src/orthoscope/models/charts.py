@@ -1,8 +1,8 @@
 """Charts: how a ray is flattened to a plane before the lens acts on it.
 
-Floor 1.  (X, Y, Z) is a ray of any length, (x, y) its place in the chart, s = |(x, y)|, theta its angle from the axis.
-Gnomonic: s = tan(theta), a pin-hole's plane, in front only.  Equidistant: s = theta, all directions but straight back.
-Coordinates are separate arrays of one shape; NaN where a ray has no place.
+(X, Y, Z) is a ray of any length, (x, y) its place in the chart, s = |(x, y)|, theta its angle from the axis.
+Gnomonic: s = tan(theta), a pin-hole's plane, in front only. Equidistant: s = theta, all directions but
+straight back. Coordinates are separate arrays of one shape; NaN where a ray has no place.
 """
 
 from __future__ import annotations
@@ -42,7 +42,9 @@ class Chart(ABC):
 
     @abstractmethod
     def flat(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:
-        """Where a pin-hole sees places, (X/Z, Y/Z) of their rays; NaN for those that are not in front of it."""
+        """Where a pin-hole sees places, (X/Z, Y/Z) of their rays; NaN for those that are not in front of
+        it.
+        """
 
     @abstractmethod
     def radius(self, theta: Any) -> Any:
@@ -95,10 +97,13 @@ class _Equidistant(Chart):
         across = np.hypot(X, Y)
         stretch = self._stretch(across, Z)
         square = 1.0 / (across * across + Z * Z)
-        # (Z / R^2 - stretch) / across^2, by its limit near the axis where the difference loses its digits
+        # (Z / R^2 - stretch) / across^2, by its limit near the axis where the difference loses its
+        # digits
         near = across < 1e-4 * Z
         safe = np.where(near, 1.0, across)
-        bend = np.where(near, -2.0 / (3.0 * np.where(near, Z, 1.0) ** 3), (Z * square - stretch) / (safe * safe))
+        bend = np.where(
+            near, -2.0 / (3.0 * np.where(near, Z, 1.0) ** 3), (Z * square - stretch) / (safe * safe)
+        )
 
         def pull_back(along_x, along_y):
             along = along_x * X + along_y * Y

@@ -1,7 +1,7 @@
 """Lenses with more than a curve: OpenCV's, radial with decentering, thin prism and sensor tilt added.
 
-Floor 1.  Symbols as in lens.py: u = s^2, r_d = s g(u), h = 2 dg/du.  D. Brown, Close-range camera calibration, 1971; coefficients,
-their order and the tilt as in OpenCV.
+Symbols as in lens.py: u = s^2, r_d = s g(u), h = 2 dg/du. D. Brown, Close-range camera calibration, 1971;
+coefficients, their order and the tilt as in OpenCV.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.charts import GNOMONIC
+from orthoscope.models.inverse_table import Lookup
 from orthoscope.models.lens import Formula, Warp
-from orthoscope.models.lookup import Lookup
-from orthoscope.models.warp import invert
+from orthoscope.models.newton_inverse import invert
 
 __all__ = ["Brown", "Rational"]
 
 
 @dataclass(frozen=True, eq=False)
 class _Decentred(Formula):
-    """A radial curve with decentering (p), thin prism (s) and sensor tilt (tau, radians) added, as OpenCV adds them."""
+    """A radial curve with decentering (p), thin prism (s) and sensor tilt (tau, radians) added, as OpenCV
+    adds them.
+    """
 
     chart = GNOMONIC
     radially_symmetric: ClassVar[bool] = False
@@ -51,7 +53,9 @@ class _Decentred(Formula):
 
     @abstractmethod
     def gain_slopes(self, u: ndarray, g: ndarray) -> dict[str, ndarray]:
-        """Derivatives of the gain by the radial coefficients, all at once since each is made of the one before."""
+        """Derivatives of the gain by the radial coefficients, all at once since each is made of the one
+        before.
+        """
 
     def warp(self, x, y):
         u = x * x + y * y
@@ -88,13 +92,17 @@ class _Decentred(Formula):
         slopes = self.gain_slopes(u, radial) if wanted else {}
         by = [_by(name, x, y, u, slopes) for name in wanted]
         flat = Warp(x_d, y_d, j_xx, j_xy, j_yx, j_yy, by)
-        return self._tilted(flat, wanted) if any(self.tilt) or "tau_x" in wanted or "tau_y" in wanted else flat
+        return (
+            self._tilted(flat, wanted) if any(self.tilt) or "tau_x" in wanted or "tau_y" in wanted else flat
+        )
 
     def unwarp(self, x_d, y_d):
         level = self._level
         if level is not self:  # seen on a level sensor, the goal is nearer to the radial curve
             m = np.linalg.inv(self._tilt_matrix)
-            in_front = m[2, 0] * x_d + m[2, 1] * y_d + m[2, 2] > 0  # past the horizon of the tilted plane nothing is seen
+            in_front = (
+                m[2, 0] * x_d + m[2, 1] * y_d + m[2, 2] > 0
+            )  # past the horizon of the tilted plane nothing is seen
             x_d, y_d = _through(m, np.where(in_front, x_d, np.nan), y_d)
         x, y = x_d.astype(np.float32), y_d.astype(np.float32)  # a start needs no more digits
         with np.errstate(all="ignore"):
@@ -121,7 +129,10 @@ class _Decentred(Formula):
         matrix, by_tau_x, by_tau_y = _tilt(*self.tilt)
         m = matrix
         w = 1.0 / (m[2, 0] * at.x + m[2, 1] * at.y + m[2, 2])
-        x, y = (m[0, 0] * at.x + m[0, 1] * at.y + m[0, 2]) * w, (m[1, 0] * at.x + m[1, 1] * at.y + m[1, 2]) * w
+        x, y = (
+            (m[0, 0] * at.x + m[0, 1] * at.y + m[0, 2]) * w,
+            (m[1, 0] * at.x + m[1, 1] * at.y + m[1, 2]) * w,
+        )
         h_xx, h_xy = (m[0, 0] - x * m[2, 0]) * w, (m[0, 1] - x * m[2, 1]) * w
         h_yx, h_yy = (m[1, 0] - y * m[2, 0]) * w, (m[1, 1] - y * m[2, 1]) * w
 
@@ -133,14 +144,19 @@ class _Decentred(Formula):
             return (top - x * bottom) * w, (middle - y * bottom) * w
 
         angles = {"tau_x": by_tau_x, "tau_y": by_tau_y}
-        by = [by_angle(angles[name]) if name in angles else chained(*pair) for name, pair in zip(wanted, at.by, strict=True)]
+        by = [
+            by_angle(angles[name]) if name in angles else chained(*pair)
+            for name, pair in zip(wanted, at.by, strict=True)
+        ]
         (j_xx, j_yx), (j_xy, j_yy) = chained(at.j_xx, at.j_yx), chained(at.j_xy, at.j_yy)
         return Warp(x, y, j_xx, j_xy, j_yx, j_yy, by)
 
 
 @dataclass(frozen=True, eq=False)
 class Brown(_Decentred):
-    """Radial k1 k2 k3, decentering p1 p2, thin prism s1..s4, tilt tau_x tau_y (OpenCV's 4, 5; 12 and 14 without k4..k6)."""
+    """Radial k1 k2 k3, decentering p1 p2, thin prism s1..s4, tilt tau_x tau_y (OpenCV's 4, 5; 12 and 14
+    without k4..k6).
+    """
 
     free: ClassVar[tuple[str, ...]] = ("k1", "k2", "p1", "p2", "k3")
 
@@ -164,7 +180,9 @@ class Brown(_Decentred):
 
 @dataclass(frozen=True, eq=False)
 class Rational(_Decentred):
-    """(1 + k1 u + k2 u^2 + k3 u^3) / (1 + k4 u + k5 u^2 + k6 u^3) with the same additions (OpenCV's 8, 12 and 14)."""
+    """(1 + k1 u + k2 u^2 + k3 u^3) / (1 + k4 u + k5 u^2 + k6 u^3) with the same additions (OpenCV's 8, 12 and
+    14).
+    """
 
     free: ClassVar[tuple[str, ...]] = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
@@ -239,5 +257,8 @@ def _tilt(tau_x: float, tau_y: float) -> tuple[ndarray, ndarray, ndarray]:
     constant = np.diag([0.0, 0.0, 1.0])
     turned = about_y @ about_x
     matrix = (projector(turned) + constant) @ turned
-    by = [projector(d) @ turned + (projector(turned) + constant) @ d for d in (about_y @ d_about_x, d_about_y @ about_x)]
+    by = [
+        projector(d) @ turned + (projector(turned) + constant) @ d
+        for d in (about_y @ d_about_x, d_about_y @ about_x)
+    ]
     return matrix, by[0], by[1]

@@ -1,8 +1,9 @@
 """Where a lens ends: in each direction of the chart, the radius at which its map first folds.
 
-Floor 1.  A place at radius s lies in the domain where s is below the end of its direction and the determinant is positive.  Both are
-needed: beyond a fold the determinant may become positive again (a decentred lens is quadratic far out, and a quadratic map
-covers the plane twice), while the ends are known in some directions only.  These are even, and halved where the end changes fast.
+A place at radius s lies in the domain where s is below the end of its direction and the determinant is
+positive. Both are needed: beyond a fold the determinant may become positive again (a decentred lens is
+quadratic far out, and a quadratic map covers the plane twice), while the ends are known in some directions
+only. These are even, and halved where the end changes fast.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ Folded = Callable[[ndarray, ndarray, ndarray], ndarray]  # of radius, cosine, si
 class Domain:
     """The part of a chart that a lens images.
 
-    hole: radius around the centre without image.  angles: (d,) of directions, ascending from -pi to pi.  ends: (d,) their radii.
+    hole: radius around the centre without image. angles: (d,) of directions, ascending from -pi to pi. ends:
+    (d,) their radii.
     """
 
     hole: float
@@ -51,7 +53,9 @@ class Domain:
         return float(self.ends.max())
 
     def ends_towards(self, x: ndarray, y: ndarray) -> ndarray:
-        """For each place (x, y) about where the domain ends in its direction: not nearer, but in the few narrow steep sectors."""
+        """For each place (x, y) about where the domain ends in its direction: not nearer, but in the few
+        narrow steep sectors.
+        """
         a, b = self.ends[:-1], self.ends[1:]
         ends = np.where(_steep(self.ends), np.minimum(a, b), (1.0 + MARGIN) * np.maximum(a, b))
         sector = np.searchsorted(self.angles, np.arctan2(y, x)) - 1
@@ -61,7 +65,8 @@ class Domain:
 def find_domain(folded: Folded, radii: ndarray, *, hole: float, symmetric: bool) -> Domain:
     """The domain of a map.
 
-    folded: tells of places (radius, cosine, sine) whether the map has folded there.  radii: (n,) ascending, where it is looked at first.
+    folded: tells of places (radius, cosine, sine) whether the map has folded there. radii: (n,) ascending,
+    where it is looked at first.
     """
     if symmetric:
         return Domain(hole, np.array([-np.pi, np.pi]), np.repeat(_first_fold(folded, radii, np.zeros(1)), 2))
@@ -83,7 +88,9 @@ def _steep(ends: ndarray) -> ndarray:
 
 
 def _first_fold(folded: Folded, radii: ndarray, angles: ndarray) -> ndarray:
-    """In each direction the radius up to which the map has not folded: among the radii, then 32 times finer again and again."""
+    """In each direction the radius up to which the map has not folded: among the radii, then 32 times finer
+    again and again.
+    """
     cosine, sine = np.cos(angles), np.sin(angles)
     radii = np.concatenate([[0.0], radii])
     bad = folded(radii[1:, None], cosine, sine)

@@ -1,10 +1,11 @@
 """A lens that no formula limits: a formula, and a spline displacement of its distorted plane on top.
 
-Floor 1.  (x_d, y_d) = b + s(b),  b = base(x, y).  The displacement acts where the image is formed, so it needs no plane through the rays:
-a base of the angle takes it past 90 degrees.  J = (I + ds/db) J_base.  Away from its lattice s is zero and the lens its base.
-The camera's K and the base's coefficients say the same as some displacements do; who fits them settles that by what a displacement
-costs (spline.py), so it has no part that K could take.  After M. Grossberg and S. Nayar's generic lenses and T. Schoeps et al., Why
-having 10,000 parameters in your camera model is better than twelve, CVPR 2020, but as a difference to a formula.
+(x_d, y_d) = b + s(b),  b = base(x, y). The displacement acts where the image is formed, so it needs no plane
+through the rays: a base of the angle takes it past 90 degrees. J = (I + ds/db) J_base. Away from its lattice
+s is zero and the lens its base. The camera's K and the base's coefficients say the same as some displacements
+do; who fits them settles that by what a displacement costs (spline.py), so it has no part that K could take.
+After M. Grossberg and S. Nayar's generic lenses and T. Schoeps et al., Why having 10,000 parameters in your
+camera model is better than twelve, CVPR 2020, but as a difference to a formula.
 """
 
 from __future__ import annotations
@@ -17,17 +18,20 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.models.charts import Chart
 from orthoscope.models.lens import Lens
+from orthoscope.models.newton_inverse import Bent, Warp, invert
 from orthoscope.models.spline import Displacement
-from orthoscope.models.warp import Warp, invert
 
 __all__ = ["FreeLens"]
 
-BACK = 3  # rounds of b <- (x_d, y_d) - s(b): a start for the inverse that is good to the third power of the displacement's slope
+# rounds of b <- (x_d, y_d) - s(b): a start for the inverse that is good to the third power of the
+# displacement's slope
+BACK = 3
 
 
 @dataclass(frozen=True, eq=False)
 class FreeLens(Lens):
-    """A formula, `base`, and a displacement of its distorted plane by bicubic splines, `over`; named coefficients are the formula's.
+    """A formula, `base`, and a displacement of its distorted plane by bicubic splines, `over`; named
+    coefficients are the formula's.
 
     Raises InputError where the base is a free lens itself.
     """
@@ -37,7 +41,10 @@ class FreeLens(Lens):
 
     def __post_init__(self) -> None:
         if isinstance(self.base, FreeLens):
-            raise InputError("the base of a free lens is a free lens; expected a formula. Add the two displacements into one.")
+            raise InputError(
+                "the base of a free lens is a free lens; expected a formula. Add the two displacements into"
+                " one."
+            )
 
     @property
     def chart(self) -> Chart:
@@ -81,6 +88,7 @@ class FreeLens(Lens):
             yx * at.j_xx + yy * at.j_yx,
             yx * at.j_xy + yy * at.j_yy,
             [(xx * b_x + xy * b_y, yx * b_x + yy * b_y) for b_x, b_y in at.by],
+            Bent(at.x, at.y, by_x[..., 0], by_y[..., 0], by_x[..., 1], by_y[..., 1]),
         )
 
     def unwarp(self, x_d: ndarray, y_d: ndarray) -> tuple[ndarray, ndarray]:

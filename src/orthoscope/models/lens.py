@@ -1,12 +1,14 @@
-"""What a lens is: a map of one chart's plane to the distorted plane, its inverse, its Jacobians and its domain.
+"""What a lens is: a map of one chart's plane to the distorted plane, its inverse, its Jacobians and its
+domain.
 
-Floor 1.  (x, y) is a ray's place in the lens's chart (charts.py), u = x^2 + y^2 = s^2, (x_d, y_d) its distorted place.  The radial
-part of every lens is one curve, given as a *gain* in u:
+(x, y) is a ray's place in the lens's chart (charts.py), u = x^2 + y^2 = s^2, (x_d, y_d) its distorted place.
+The radial part of every lens is one curve, given as a *gain* in u:
 
     r_d = s g(u),    h = 2 dg/du,    slope dr_d/ds = g + h u,    J = g I + h (x, y) (x, y)^T
 
-so nothing divides by s and the centre needs no case of its own.  The *domain* (domain.py) ends where the map first folds (its
-determinant reaches zero), divides by zero or stops being real.  Inside it the inverse is unique and found by Newton (warp.py).
+so nothing divides by s and the centre needs no case of its own. The *domain* (domain.py) ends where the map
+first folds (its determinant reaches zero), divides by zero or stops being real. Inside it the inverse is
+unique and found by Newton (newton_inverse.py).
 """
 
 from __future__ import annotations
@@ -20,11 +22,11 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from orthoscope.geometry.arrays import Bool, Float, InputError, frozen, ndarray
-from orthoscope.models.blocks import in_blocks
 from orthoscope.models.charts import Chart
+from orthoscope.models.chunks import in_blocks
 from orthoscope.models.domain import Domain, find_domain
-from orthoscope.models.lookup import Lookup, tabulated
-from orthoscope.models.warp import Warp, determinant
+from orthoscope.models.inverse_table import Lookup, tabulated
+from orthoscope.models.newton_inverse import Warp, determinant
 
 __all__ = ["Formula", "Lens", "RadialLens", "Warp"]
 
@@ -33,7 +35,9 @@ SECTORS = 32  # of directions in the image, for each of which it is known how fa
 STEEPEST = 1e-6  # a gnomonic chart is looked at up to this close to 90 degrees (radians)
 MIDDLE = np.pi / 4  # of the inverse's table half of the cells lie within this angle
 NEAR = 3e-9  # a Newton step shorter than this share leaves less than a rounding, since the error squares;
-SHY = 0.99  # but not beside a fold or a border where the slope has none: there u_d goes from this share of its end to all of it
+# but not beside a fold or a border where the slope has none: there u_d goes from this share of its end to all
+# of it
+SHY = 0.99
 TINY = 1e-150  # a radius next to zero whose square is a number still
 
 AnyLens = TypeVar("AnyLens", bound="Lens")
@@ -95,11 +99,15 @@ class Lens(ABC):
 
     @property
     def field_angle(self) -> float:
-        """The angle from the axis at which the domain ends, radians (in the direction where it reaches farthest)."""
+        """The angle from the axis at which the domain ends, radians (in the direction where it reaches
+        farthest).
+        """
         return float(self.chart.angle(np.float64(self.domain.outer)))
 
     def distort(self, rays: Float[ndarray, "n 3"], *, beyond: bool = False) -> Float[ndarray, "n 2"]:
-        """Where rays (n,3), any length, fall on the lens's plane; NaN beyond the domain, unless the formula is to go on `beyond` it."""
+        """Where rays (n,3), any length, fall on the lens's plane; NaN beyond the domain, unless the formula
+        is to go on `beyond` it.
+        """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             x, y = self.chart.flatten(rays[:, 0], rays[:, 1], rays[:, 2])
             plane = np.stack(self.warp(x, y), axis=-1)
@@ -124,24 +132,34 @@ class Lens(ABC):
         border = np.flatnonzero(~seen & (s <= 1.01 * domain.outer))
         if len(border):
             at = self.linearise(x[border], y[border])
-            seen[border] = (s[border] < domain.ends_towards(x[border], y[border])) & (determinant(at) > 0) & np.isfinite(at.x)
+            seen[border] = (
+                (s[border] < domain.ends_towards(x[border], y[border]))
+                & (determinant(at) > 0)
+                & np.isfinite(at.x)
+            )
         return seen
 
     def sees_all_up_to(self, rays: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
-        """Whether not only a ray (n,3) lies in the domain but every one that is no farther from the axis, so far as is known at once.
+        """Whether not only a ray (n,3) lies in the domain but every one that is no farther from the axis, so
+        far as is known at once.
 
-        In a pin-hole's plane these are a disc: a lens that sees all up to the corners of a rectangle sees all of the rectangle.
+        In a pin-hole's plane these are a disc: a lens that sees all up to the corners of a rectangle sees all
+        of the rectangle.
         """
         with np.errstate(invalid="ignore"):
             x, y = self.chart.flatten(rays[:, 0], rays[:, 1], rays[:, 2])
         return (x * x + y * y < self.domain.inner**2) & (self.domain.hole == 0)
 
     def invert_curve(self, r_d: ndarray) -> ndarray:
-        """s of the radial curve at r_d >= 0: table, Newton, and bisection where Newton was not exact; NaN beyond the domain."""
+        """s of the radial curve at r_d >= 0: table, Newton, and bisection where Newton was not exact; NaN
+        beyond the domain.
+        """
         s_table, r_table = self._table
         if len(r_table) == 0:  # a curve that is negative all along
             return np.full_like(r_d, np.nan)
-        inside = (r_d >= r_table[0]) & (r_d <= r_table[-1] * (1.0 + 1e-15))  # at a fold r_d may be a rounding past the table
+        inside = (r_d >= r_table[0]) & (
+            r_d <= r_table[-1] * (1.0 + 1e-15)
+        )  # at a fold r_d may be a rounding past the table
         s = np.interp(r_d, r_table, s_table)
         for _ in range(3):
             g, h = self.gain(s * s)
@@ -153,7 +171,9 @@ class Lens(ABC):
         return np.where(inside, s, np.nan)
 
     def _bisect(self, r_d: ndarray) -> ndarray:
-        """Newton kept inside its cell of the table by bisection, for the few places where free Newton was not exact."""
+        """Newton kept inside its cell of the table by bisection, for the few places where free Newton was not
+        exact.
+        """
         s_table, r_table = self._table
         cell = np.searchsorted(r_table, r_d).clip(1, len(r_table) - 1)
         low, high = s_table[cell - 1].copy(), s_table[cell].copy()
@@ -169,7 +189,9 @@ class Lens(ABC):
         return s
 
     def beyond_image(self, x_d: ndarray, y_d: ndarray) -> ndarray:
-        """Which places are certainly not in the image of the domain: farther out than any sample of it in about their direction."""
+        """Which places are certainly not in the image of the domain: farther out than any sample of it in
+        about their direction.
+        """
         farthest = self._farthest
         u_d = x_d * x_d + y_d * y_d
         beyond = ~(u_d <= farthest.min() ** 2)
@@ -179,11 +201,16 @@ class Lens(ABC):
 
     @cached_property
     def _farthest(self) -> ndarray:
-        """How far the image of the domain reaches in each sector of directions, with a margin; infinite where it is not known."""
+        """How far the image of the domain reaches in each sector of directions, with a margin; infinite where
+        it is not known.
+        """
         ends = self.chart.angle(self.domain.ends)
         s = self.chart.radius(ends * np.linspace(0.0, 1.0 - 1e-12, 65)[:, None])
         with np.errstate(all="ignore"):
-            x_d, y_d = (part.ravel() for part in self.warp(s * np.cos(self.domain.angles), s * np.sin(self.domain.angles)))
+            x_d, y_d = (
+                part.ravel()
+                for part in self.warp(s * np.cos(self.domain.angles), s * np.sin(self.domain.angles))
+            )
         reach = np.zeros(SECTORS)
         np.maximum.at(reach, _sector(x_d, y_d), np.nan_to_num(np.hypot(x_d, y_d), nan=np.inf))
         reach[reach == 0] = np.inf
@@ -209,13 +236,17 @@ class Lens(ABC):
         return float(self.chart.radius(np.float64(self.chart.reach - STEEPEST)))
 
     def _radii(self, end: float, samples: int = SAMPLES) -> ndarray:
-        """Radii from 0 to end, their angles dense at both: at the axis, where most is seen, and at the end, where curves bend."""
+        """Radii from 0 to end, their angles dense at both: at the axis, where most is seen, and at the end,
+        where curves bend.
+        """
         t = np.linspace(0.0, 1.0, samples)
         return self.chart.radius(self.chart.angle(np.float64(end)) * t**3 * (10.0 + t * (6.0 * t - 15.0)))
 
     @cached_property
     def _hole(self) -> float:
-        """Radius around the centre without image: 0 but for a curve that starts below zero (pfet with a0 < 0)."""
+        """Radius around the centre without image: 0 but for a curve that starts below zero (pfet with a0 <
+        0).
+        """
         radii = self._radii(self._limit)[1:]
         with np.errstate(all="ignore"):
             inside_out = ~(self.gain(radii * radii)[0] > 0)
@@ -238,7 +269,9 @@ class Lens(ABC):
             s = np.concatenate([[self._hole], s[s > self._hole]])
             r = s * self.gain(s * s)[0]
             if np.isnan(r[0]):
-                r[0] = TINY * self.gain(np.full(1, TINY * TINY))[0][0]  # the limit at the centre of a curve that does not start at 0
+                r[0] = (
+                    TINY * self.gain(np.full(1, TINY * TINY))[0][0]
+                )  # the limit at the centre of a curve that does not start at 0
         usable = np.isfinite(r) & (r >= 0)
         return s[usable], r[usable]
 
@@ -266,15 +299,21 @@ class Lens(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Formula(Lens):
-    """A lens whose coefficients are all there is to it: subclasses are frozen dataclasses whose fields are the coefficients, in order."""
+    """A lens whose coefficients are all there is to it: subclasses are frozen dataclasses whose fields are
+    the coefficients, in order.
+    """
 
     chart: ClassVar[Chart]  # type: ignore[misc]
     radially_symmetric: ClassVar[bool]  # type: ignore[misc]
     free: ClassVar[tuple[str, ...]]  # type: ignore[misc]
-    starts: ClassVar[tuple[dict[str, float], ...]] = ({},)  # coefficients from which a fit may have to start to find its minimum
+    starts: ClassVar[tuple[dict[str, float], ...]] = (
+        {},
+    )  # coefficients from which a fit may have to start to find its minimum
 
     def __post_init__(self) -> None:
-        frozen([getattr(self, name) for name in self.names()], (None,), f"{type(self).__name__}: coefficients")
+        frozen(
+            [getattr(self, name) for name in self.names()], (None,), f"{type(self).__name__}: coefficients"
+        )
 
     @classmethod
     @cache
@@ -288,7 +327,10 @@ class Formula(Lens):
     def with_coefficients(self: AnyFormula, **values: float) -> AnyFormula:
         unknown = set(values) - set(self.names())
         if unknown:
-            raise InputError(f"{type(self).__name__} has no coefficient {sorted(unknown)[0]!r}; it has {', '.join(self.names())}.")
+            raise InputError(
+                f"{type(self).__name__} has no coefficient {sorted(unknown)[0]!r}; it has"
+                f" {', '.join(self.names())}."
+            )
         return replace(self, **{name: float(value) for name, value in values.items()})
 
 
@@ -327,7 +369,9 @@ class RadialLens(Formula):
         return x_d * q, y_d * q
 
     def _exact_ratio(self, r_d: ndarray) -> ndarray:
-        """s / r_d where the table is no good start: beside a fold, at the centre of a curve that has a corner there, beyond the domain."""
+        """s / r_d where the table is no good start: beside a fold, at the centre of a curve that has a corner
+        there, beyond the domain.
+        """
         s = self.invert_curve(r_d)
         centre = r_d == 0
         return np.where(centre, np.where(s == 0, 1.0, np.nan), s / np.where(centre, 1.0, r_d))

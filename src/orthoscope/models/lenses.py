@@ -1,6 +1,6 @@
 """`LENSES`, the table of lenses by name that everything else goes by, and the descriptions that users give.
 
-Floor 1.  The formulas are in decentred_lenses.py and radial_lenses.py.
+The formulas are in decentred_lenses.py and radial_lenses.py.
 """
 
 from __future__ import annotations
@@ -40,35 +40,51 @@ LENSES: dict[str, type[Formula]] = {
 
 
 def parse_lens(text: str) -> tuple[type[Formula], tuple[str, ...]]:
-    """The lens of a description such as `brown` or `brown:k1,k2`, and the coefficients that a calibration is to free.
+    """The lens of a description such as `brown` or `brown:k1,k2`, and the coefficients that a calibration is
+    to free.
 
     Raises InputError for a lens or a coefficient that is not there.
     """
     name, _, listed = text.strip().partition(":")
     if name not in LENSES:
-        raise InputError(f"lens {name!r} is not known; expected one of {', '.join(LENSES)}, as in --lens brown or --lens brown:k1,k2.")
+        raise InputError(
+            f"lens {name!r} is not known; expected one of {', '.join(LENSES)}, as in --lens brown or --lens"
+            " brown:k1,k2."
+        )
     lens = LENSES[name]
     free = tuple(part.strip() for part in listed.split(",") if part.strip()) if listed else lens.free
     for coefficient in free:
         if coefficient not in lens.names():
-            raise InputError(f"lens {name!r} has no coefficient {coefficient!r}; it has {', '.join(lens.names())}.")
+            raise InputError(
+                f"lens {name!r} has no coefficient {coefficient!r}; it has {', '.join(lens.names())}."
+            )
     return lens, free
 
 
 def lens_with_values(text: str) -> Formula:
-    """The lens of a description with values, such as `brown:k1=-0.3,k2=0.1`; coefficients that are not named keep their usual value.
+    """The lens of a description with values, such as `brown:k1=-0.3,k2=0.1`; coefficients that are not named
+    keep their usual value.
 
     Raises InputError for a lens, a coefficient or a value that is none.
     """
     name, _, listed = text.strip().partition(":")
     lens, _ = parse_lens(name)
     try:
-        values = {key.strip(): float(value) for key, value in (part.split("=") for part in listed.split(",") if part.strip())}
+        values = {
+            key.strip(): float(value)
+            for key, value in (part.split("=") for part in listed.split(",") if part.strip())
+        }
     except ValueError as error:
-        raise InputError(f"lens {text!r} is not understood; expected a name and values, such as brown:k1=-0.3,k2=0.1.") from error
+        raise InputError(
+            f"lens {text!r} is not understood; expected a name and values, such as brown:k1=-0.3,k2=0.1."
+        ) from error
     return lens().with_coefficients(**values)
 
 
 def lens_name(lens: Lens) -> str:
     """The name of a lens in LENSES, or `free`."""
-    return FREE if isinstance(lens, FreeLens) else next(name for name, kind in LENSES.items() if type(lens) is kind)
+    return (
+        FREE
+        if isinstance(lens, FreeLens)
+        else next(name for name, kind in LENSES.items() if type(lens) is kind)
+    )

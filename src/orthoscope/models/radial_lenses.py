@@ -1,10 +1,12 @@
 """Lenses that are nothing but a curve, each the few lines that are its own.
 
-Floor 1.  Symbols as in lens.py: u = s^2, r_d = s g(u), h = 2 dg/du.
+Symbols as in lens.py: u = s^2, r_d = s g(u), h = 2 dg/du.
 
-pfet, fet         A. Basu and S. Licardie, Alternative models for fish-eye lenses, PRL 16(4), 1995; the paper's eq. (1).
+pfet, fet         A. Basu and S. Licardie, Alternative models for fish-eye lenses, PRL 16(4), 1995; the
+paper's eq. (1).
 fov               F. Devernay and O. Faugeras, Straight lines have to be straight, MVA 13(1), 2001.
-division          A. Fitzgibbon, Simultaneous linear estimation of multiple view geometry and lens distortion, CVPR 2001.
+division          A. Fitzgibbon, Simultaneous linear estimation of multiple view geometry and lens distortion,
+CVPR 2001.
 kannala_brandt    J. Kannala and S. Brandt, A generic camera model and calibration method, TPAMI 28(8), 2006;
                   OpenCV's fisheye, Kalibr's equidistant.
 """
@@ -28,8 +30,8 @@ __all__ = ["Division", "Fet", "Fov", "KannalaBrandt", "Pfet"]
 class Pfet(RadialLens):
     """Polynomial fish-eye transform, r_d = a0 + a1 s + ... + a5 s^5 (the paper's eq. 1).
 
-    In a joint calibration a1 stays 1, since K scales the plane too, and a0 stays 0: any other a0 tears the image at its
-    centre (a ring of radius |a0| without preimage), where the place is NaN.
+    In a joint calibration a1 stays 1, since K scales the plane too, and a0 stays 0: any other a0 tears the
+    image at its centre (a ring of radius |a0| without preimage), where the place is NaN.
     """
 
     chart = GNOMONIC
@@ -144,7 +146,9 @@ class KannalaBrandt(RadialLens):
 
     def gain(self, u):
         k1, k2, k3, k4 = self.k1, self.k2, self.k3, self.k4
-        return 1.0 + u * (k1 + u * (k2 + u * (k3 + u * k4))), 2.0 * (k1 + u * (2 * k2 + u * (3 * k3 + 4 * k4 * u)))
+        return 1.0 + u * (k1 + u * (k2 + u * (k3 + u * k4))), 2.0 * (
+            k1 + u * (2 * k2 + u * (3 * k3 + 4 * k4 * u))
+        )
 
     def gain_by(self, name, u, g):
         return prod([u] * int(name[1]), start=np.ones_like(u))  # many times faster than a power

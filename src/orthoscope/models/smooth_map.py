@@ -1,13 +1,16 @@
-"""A map of an image's pixels, asked for at few of them and interpolated between, where that is as good as asking for each.
+"""A map of an image's pixels, asked for at few of them and interpolated between, where that is as good as
+asking for each.
 
-Floor 1.  The image is cut into tiles of about SIDE pixels.  On each the map is the polynomial of degree N - 1 in x and in y through its
-values at N x N Chebyshev points, which lie on the tile's sides too, so that neighbours share them and no seam shows.  A lens is analytic
-within its domain, so a polynomial's error falls geometrically with N; it is greatest half-way between the points and is looked up there.
-For a usual lens it is far below what float32 rounds; beside a fold, or with a spline in the lens, it is some ten-thousandths of a
-pixel.  A tile is asked pixel by pixel where that error is above TOLERANCE, or where it has a corner for which the
-caller does not vouch: the border of a lens's domain is never interpolated.
+The image is cut into tiles of about SIDE pixels. On each the map is the polynomial of degree N - 1 in x and
+in y through its values at N x N Chebyshev points, which lie on the tile's sides too, so that neighbours share
+them and no seam shows. A lens is analytic within its domain, so a polynomial's error falls geometrically with
+N; it is greatest half-way between the points and is looked up there. For a usual lens it is far below what
+float32 rounds; beside a fold, or with a spline in the lens, it is some ten-thousandths of a pixel. A tile is
+asked pixel by pixel where that error is above TOLERANCE, or where it has a corner for which the caller does
+not vouch: the border of a lens's domain is never interpolated.
 
-L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 8 (convergence) and 15 (Lebesgue constants).
+L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 8 (convergence) and 15
+(Lebesgue constants).
 """
 
 from __future__ import annotations
@@ -25,15 +28,19 @@ __all__ = ["TOLERANCE", "smooth_map"]
 SIDE = 64  # pixels of a tile
 N = 6
 TOLERANCE = 1e-3  # px; cv2.remap itself rounds places to 1/32 px
-LEBESGUE = 4.0  # a polynomial in x and y is nowhere on its tile larger than this times its largest value at the points
-DOUBT = 5e-3  # px: a pixel whose place is as near as this to the limits is asked for itself; several times TOLERANCE
+# a polynomial in x and y is nowhere on its tile larger than this times its largest value at the points
+LEBESGUE = 4.0
+# px: a pixel whose place is as near as this to the limits is asked for itself; several times TOLERANCE
+DOUBT = 5e-3
 
 Look = Callable[[Float[ndarray, "n 2"]], Float[ndarray, "n 2"]]
 Vouched = Callable[[Float[ndarray, "n 2"]], Bool[ndarray, " n"]]
 
 
 class _Tiles(NamedTuple):
-    """Tiles along one side of an image.  points, between: where the map is asked for and tried, ascending, shared points once."""
+    """Tiles along one side of an image. points, between: where the map is asked for and tried, ascending,
+    shared points once.
+    """
 
     number: int
     side: int
@@ -59,17 +66,20 @@ class _Limits(NamedTuple):
 def smooth_map(
     look: Look, size: tuple[int, int], *, vouched: Vouched, limits: tuple[int, int]
 ) -> tuple[Float[ndarray, "h w"], Float[ndarray, "h w"]]:
-    """x and y of what `look` says of each pixel of an image of `size` (width, height), float32, to within TOLERANCE and rounding.
+    """x and y of what `look` says of each pixel of an image of `size` (width, height), float32, to within
+    TOLERANCE and rounding.
 
-    look: pixels (n,2) to places (n,2), NaN where there are none.  vouched: of pixels (n,2), whether `look` is smooth there; where it is at
-    the corners of a rectangle it must be all over it.  limits: (width, height) of what is looked at; places farther out than a pixel are
-    NaN.
+    look: pixels (n,2) to places (n,2), NaN where there are none. vouched: of pixels (n,2), whether `look` is
+    smooth there; where it is at the corners of a rectangle it must be all over it. limits: (width, height) of
+    what is looked at; places farther out than a pixel are NaN.
     """
     (width, height), seen = size, np.array(limits, dtype=float)
     within = _Limits(0.5 * (seen - 1.0), 0.5 * (seen + 1.0))
     across, down = _tiles(width), _tiles(height)
     values = _at(look, across.points, down.points)
-    plain = _of_corners(np.logical_and, _on_corners(vouched, across, down)) & (_errors(look, values, across, down) <= TOLERANCE)
+    plain = _of_corners(np.logical_and, _on_corners(vouched, across, down)) & (
+        _errors(look, values, across, down) <= TOLERANCE
+    )
     maps = _interpolated(values, across, down, size)
     unsure = [np.empty((0, 2), dtype=np.int64)]
     for row, run in _runs(plain & ~_inside(values, within)):
@@ -129,13 +139,19 @@ def _windows(values: ndarray, axis: int) -> ndarray:
     return windows[(slice(None),) * axis + (slice(None, None, N - 1),)]
 
 
-def _spread(values: Float[ndarray, "2 rows points"], weights: Float[ndarray, "m n"]) -> Float[ndarray, "2 rows all"]:
+def _spread(
+    values: Float[ndarray, "2 rows points"], weights: Float[ndarray, "m n"]
+) -> Float[ndarray, "2 rows all"]:
     """The polynomials along x, at m places in every tile."""
     return (_windows(values, 2) @ weights.T).reshape(2, values.shape[1], -1)
 
 
-def _interpolated(values: ndarray, across: _Tiles, down: _Tiles, size: tuple[int, int]) -> Float[ndarray, "2 h w"]:
-    """The polynomials at every pixel; in single precision but for the tile's first row, from which the others differ little."""
+def _interpolated(
+    values: ndarray, across: _Tiles, down: _Tiles, size: tuple[int, int]
+) -> Float[ndarray, "2 h w"]:
+    """The polynomials at every pixel; in single precision but for the tile's first row, from which the others
+    differ little.
+    """
     width, height = size
     rows = _spread(values, _weights(np.arange(across.side) / across.side))[:, :, :width]
     weights = _weights(np.arange(down.side) / down.side).astype(np.float32)
@@ -149,19 +165,29 @@ def _interpolated(values: ndarray, across: _Tiles, down: _Tiles, size: tuple[int
 
 
 def _errors(look: Look, values: ndarray, across: _Tiles, down: _Tiles) -> Float[ndarray, "rows columns"]:
-    """By how much each tile's polynomial misses the map half-way between its points; NaN where the map has no value."""
+    """By how much each tile's polynomial misses the map half-way between its points; NaN where the map has no
+    value.
+    """
     weights = _weights(_points(half_way=True))
     columns = _windows(_spread(values, weights), 1) @ weights.T  # (2, tiles down, all across, half-way down)
-    missed = np.abs(np.moveaxis(columns, 3, 2).reshape(2, len(down.between), -1) - _at(look, across.between, down.between))
+    missed = np.abs(
+        np.moveaxis(columns, 3, 2).reshape(2, len(down.between), -1) - _at(look, across.between, down.between)
+    )
     return missed.reshape(2, down.number, N - 1, across.number, N - 1).max((0, 2, 4))
 
 
 def _inside(values: ndarray, within: _Limits) -> Bool[ndarray, "rows columns"]:
-    """Tiles that surely keep within the limits: their bilinear part is farthest out in a corner, and the rest of them is small."""
+    """Tiles that surely keep within the limits: their bilinear part is farthest out in a corner, and the rest
+    of them is small.
+    """
     middle, reach = within.middle[:, None, None], within.reach[:, None, None]
     corners, t = values[:, :: N - 1, :: N - 1], _points()[:, None, None]
-    sides = (1.0 - t) * corners[:, None, :-1] + t * corners[:, None, 1:]  # (2, N, tiles down, tiles across + 1)
-    bilinear = (1.0 - t) * sides[:, :, None, :, :-1] + t * sides[:, :, None, :, 1:]  # (2, N, N, tiles down, tiles across)
+    sides = (1.0 - t) * corners[:, None, :-1] + t * corners[
+        :, None, 1:
+    ]  # (2, N, tiles down, tiles across + 1)
+    bilinear = (1.0 - t) * sides[:, :, None, :, :-1] + t * sides[
+        :, :, None, :, 1:
+    ]  # (2, N, N, tiles down, tiles across)
     rest = np.abs(np.moveaxis(_windows(_windows(values, 1), 2), (3, 4), (1, 2)) - bilinear).max((1, 2))
     return (_of_corners(np.maximum, np.abs(corners - middle)) + LEBESGUE * rest < reach).all(0)
 
@@ -175,8 +201,12 @@ def _runs(flags: Bool[ndarray, "rows columns"]) -> Iterator[tuple[slice, slice]]
 
 
 def _cut(maps: Float[ndarray, "2 h w"], within: _Limits) -> ndarray:
-    """Makes NaN of what lies outside the limits, and returns the pixels (n,2) of this part that lie too near them to tell."""
-    past, past_y = (np.abs(part - np.float32(middle)) for part, middle in zip(maps, within.middle, strict=True))
+    """Makes NaN of what lies outside the limits, and returns the pixels (n,2) of this part that lie too near
+    them to tell.
+    """
+    past, past_y = (
+        np.abs(part - np.float32(middle)) for part, middle in zip(maps, within.middle, strict=True)
+    )
     past -= np.float32(within.reach[0])
     past_y -= np.float32(within.reach[1])
     np.maximum(past, past_y, out=past)

@@ -1,13 +1,14 @@
 """A displacement of the plane by bicubic B-splines: smooth everywhere, zero away from its lattice.
 
-Floor 1.  s(x, y) = sum over i, j of B((x - x_0) / h_x - i) B((y - y_0) / h_y - j) c_ij with the uniform cubic B-spline B, whose
-four pieces on a cell are the WEIGHTS below (C. de Boor, A Practical Guide to Splines, 1978).  Coefficients outside the lattice are
-zero, so s falls to zero within three cells of its border, twice continuously differentiable all the way.
+s(x, y) = sum over i, j of B((x - x_0) / h_x - i) B((y - y_0) / h_y - j) c_ij with the uniform cubic B-spline
+B, whose four pieces on a cell are the WEIGHTS below (C. de Boor, A Practical Guide to Splines, 1978).
+Coefficients outside the lattice are zero, so s falls to zero within three cells of its border, twice
+continuously differentiable all the way.
 
 How rough a displacement is, for a range l beyond which its values have nothing to say about each other:
     energy = integral of  s^2 / l^4 + 2 |grad s|^2 / l^2 + |second derivatives|^2,
-a Matern prior (F. Lindgren, H. Rue, J. Lindstrom, An explicit link between Gaussian fields and Gaussian Markov random fields, 2011):
-smooth where there are data, back to zero where there are none.
+a Matern prior (F. Lindgren, H. Rue, J. Lindstrom, An explicit link between Gaussian fields and Gaussian
+Markov random fields, 2011): smooth where there are data, back to zero where there are none.
 """
 
 from __future__ import annotations
@@ -22,13 +23,17 @@ __all__ = ["Displacement", "Lattice"]
 
 ACROSS = 4  # splines that are not zero on a cell, in each direction
 # the four pieces of the cubic B-spline on a cell as polynomials in t = 0..1, lowest power first
-WEIGHTS = np.array([[1.0, -3.0, 3.0, -1.0], [4.0, 0.0, -6.0, 3.0], [1.0, 3.0, 3.0, -3.0], [0.0, 0.0, 0.0, 1.0]]).T / 6.0
+WEIGHTS = (
+    np.array([[1.0, -3.0, 3.0, -1.0], [4.0, 0.0, -6.0, 3.0], [1.0, 3.0, 3.0, -3.0], [0.0, 0.0, 0.0, 1.0]]).T
+    / 6.0
+)
 NODES = 4  # of Gauss and Legendre: exact for the squares of cubics
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Where the splines stand: origin (2,) is the corner of the first cell, step (2,) a cell's size, shape how many splines in x, in y.
+    """Where the splines stand: origin (2,) is the corner of the first cell, step (2,) a cell's size, shape
+    how many splines in x, in y.
 
     Raises InputError for fewer than four splines in a direction or a cell without size.
     """
@@ -43,14 +48,21 @@ class Lattice:
         object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
         if min(self.shape) < ACROSS or not (self.step > 0).all():
             raise InputError(
-                f"a lattice of {self.shape} splines with steps {self.step} is none; expected at least 4 each way, steps above 0."
+                f"a lattice of {self.shape} splines with steps {self.step} is none; expected at least 4 each"
+                " way, steps above 0."
             )
 
     @classmethod
     def over(cls, low: Float[ndarray, " 2"], high: Float[ndarray, " 2"], cells: tuple[int, int]) -> Lattice:
-        """The lattice whose splines make every bicubic function of so many cells over the rectangle from low to high."""
+        """The lattice whose splines make every bicubic function of so many cells over the rectangle from low
+        to high.
+        """
         low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         return cls(low, (high - low) / cells, (cells[0] + ACROSS - 1, cells[1] + ACROSS - 1))
+
+    def seen_from(self, scale: Float[ndarray, " 2"], shift: Float[ndarray, " 2"]) -> Lattice:
+        """The same lattice where places of the plane are written scale * place + shift."""
+        return Lattice(scale * self.origin + shift, scale * self.step, self.shape)
 
     @property
     def splines(self) -> int:
@@ -63,9 +75,11 @@ class Lattice:
         return (down[..., :, None] * across[..., None, :]).reshape(*x.shape, self.splines)
 
     def along(self, places: ndarray, axis: int) -> tuple[ndarray, ndarray]:
-        """Values and slopes (..., n) of the n splines of one direction, 0 for x and 1 for y, at places of any shape (...).
+        """Values and slopes (..., n) of the n splines of one direction, 0 for x and 1 for y, at places of any
+        shape (...).
 
-        With a the distance from a spline's middle in cells: ((2 - a)+^3 - 4 (1 - a)+^3) / 6.  Zero where a place is no number.
+        With a the distance from a spline's middle in cells: ((2 - a)+^3 - 4 (1 - a)+^3) / 6. Zero where a
+        place is no number.
         """
         t = (places - self.origin[axis]) / self.step[axis] + 1.0
         offset = np.nan_to_num(t, nan=-ACROSS)[..., None] - np.arange(self.shape[axis])
@@ -79,7 +93,8 @@ class Lattice:
     def energy(self, reach: float) -> Float[ndarray, "g g"]:
         """The matrix E of the roughness c'Ec, in the module's words; reach: its range l, in the plane's unit.
 
-        Scaled so that a displacement drawn from exp(-c'Ec / 2) has about unit variance in the middle of the lattice.
+        Scaled so that a displacement drawn from exp(-c'Ec / 2) has about unit variance in the middle of the
+        lattice.
         """
         (x0, x1, x2), (y0, y1, y2) = (_grams(self.shape[axis], float(self.step[axis])) for axis in (0, 1))
         energy = np.kron(y0, x0) / reach**4 + 2.0 / reach**2 * (np.kron(y0, x1) + np.kron(y1, x0))
@@ -91,13 +106,19 @@ class Lattice:
 
 @dataclass(frozen=True, eq=False)
 class Displacement:
-    """s(x, y): how places of a plane are moved.  coefficients: (splines, 2), of x and of y, in the plane's unit."""
+    """s(x, y): how places of a plane are moved. coefficients: (splines, 2), of x and of y, in the plane's
+    unit.
+    """
 
     lattice: Lattice
     coefficients: ndarray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", frozen(self.coefficients, (self.lattice.splines, 2), "displacement: coefficients"))
+        object.__setattr__(
+            self,
+            "coefficients",
+            frozen(self.coefficients, (self.lattice.splines, 2), "displacement: coefficients"),
+        )
 
     def at(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray, ndarray]:
         """s, ds/dx and ds/dy at places of any shape (...), each (..., 2)."""
@@ -114,7 +135,9 @@ class Displacement:
 
 
 def _grams(splines: int, step: float) -> tuple[ndarray, ndarray, ndarray]:
-    """Integrals over the lattice's cells of products of two splines, of their slopes, of their second derivatives."""
+    """Integrals over the lattice's cells of products of two splines, of their slopes, of their second
+    derivatives.
+    """
     nodes, shares = np.polynomial.legendre.leggauss(NODES)
     powers = np.vander(0.5 * (nodes + 1.0), 4, increasing=True)
     grams = []

@@ -1,8 +1,9 @@
 """Where a target's corners really are: printed targets are stretched, bent and wavy.
 
-Floor 1.  The corners of a target are at its nominal points plus displacements, metres, in the target's frame.  A similarity would only
-move, turn or scale the whole target, which its poses (and the unit of length) do already: displacements have none.
-`flat` trusts the target; `smooth` is a surface of low order, in-plane scale and shear included; `free` gives each corner its own.
+The corners of a target are at its nominal points plus displacements, metres, in the target's frame. A
+similarity would only move, turn or scale the whole target, which its poses (and the unit of length) do
+already: displacements have none. `flat` trusts the target; `smooth` is a surface of low order, in-plane scale
+and shear included; `free` gives each corner its own.
 """
 
 from __future__ import annotations
@@ -18,13 +19,21 @@ from orthoscope.geometry.pose import nearest_rotation
 __all__ = ["SHAPES", "TargetShape", "polynomials", "without_similarity"]
 
 SHAPES = ("flat", "smooth", "free")
-ORDERS = (1, 2, 3, 4)  # of a smooth surface: a sheet that was stretched, hangs or curls; waves are for single corners
-TOLD = 1e-6  # a polynomial that differs from those before it by less than this share of its size is one of them
+ORDERS = (
+    1,
+    2,
+    3,
+    4,
+)  # of a smooth surface: a sheet that was stretched, hangs or curls; waves are for single corners
+TOLD = (
+    1e-6  # a polynomial that differs from those before it by less than this share of its size is one of them
+)
 
 
 @dataclass(frozen=True, eq=False)
 class TargetShape:
-    """kind: one of SHAPES.  displacements: (m,3) metres, target frame, from nominal to real; 0 for corners that were never seen.
+    """kind: one of SHAPES. displacements: (m,3) metres, target frame, from nominal to real; 0 for corners
+    that were never seen.
 
     Raises InputError for another kind, or a flat target whose corners are displaced.
     """
@@ -35,9 +44,14 @@ class TargetShape:
     def __post_init__(self) -> None:
         if self.kind not in SHAPES:
             raise InputError(f"target shape {self.kind!r} is not known; expected one of {', '.join(SHAPES)}.")
-        object.__setattr__(self, "displacements", frozen(self.displacements, (None, 3), "target shape: displacements"))
+        object.__setattr__(
+            self, "displacements", frozen(self.displacements, (None, 3), "target shape: displacements")
+        )
         if self.kind == "flat" and self.displacements.any():
-            raise InputError("a flat target's corners are displaced; expected displacements of 0, or the shape smooth or free.")
+            raise InputError(
+                "a flat target's corners are displaced; expected displacements of 0, or the shape smooth or"
+                " free."
+            )
 
     @classmethod
     def flat(cls, corners: int) -> TargetShape:
@@ -56,10 +70,14 @@ class TargetShape:
         return float(np.ptp(self.displacements[:, 2]))
 
 
-def without_similarity(points: Float[ndarray, "m 3"], displacements: Float[ndarray, "m 3"], seen: ndarray) -> Float[ndarray, "m 3"]:
-    """The same shape, moved, turned and scaled as a whole to where it is nearest to its nominal points; 0 for corners that were not seen.
+def without_similarity(
+    points: Float[ndarray, "m 3"], displacements: Float[ndarray, "m 3"], seen: ndarray
+) -> Float[ndarray, "m 3"]:
+    """The same shape, moved, turned and scaled as a whole to where it is nearest to its nominal points; 0 for
+    corners that were not seen.
 
-    seen: (m,) bool, at least three corners off a line.  S. Umeyama, Least-squares estimation of transformations, TPAMI 13(4), 1991.
+    seen: (m,) bool, at least three corners off a line. S. Umeyama, Least-squares estimation of
+    transformations, TPAMI 13(4), 1991.
     """
     nominal, real = points[seen], points[seen] + displacements[seen]
     centre = real.mean(0)
@@ -71,8 +89,11 @@ def without_similarity(points: Float[ndarray, "m 3"], displacements: Float[ndarr
     return settled
 
 
-def polynomials(points: Float[ndarray, "m 3"], seen: ndarray, *, orders: Sequence[int] = ORDERS) -> Float[ndarray, "m r"]:
-    """Polynomials of the target's plane, orthogonal over the seen corners and of mean square 1 there; 0 at corners that were not seen.
+def polynomials(
+    points: Float[ndarray, "m 3"], seen: ndarray, *, orders: Sequence[int] = ORDERS
+) -> Float[ndarray, "m r"]:
+    """Polynomials of the target's plane, orthogonal over the seen corners and of mean square 1 there; 0 at
+    corners that were not seen.
 
     seen: (m,) bool.  orders: which are wanted.  Fewer where the seen corners cannot tell them apart.
     """

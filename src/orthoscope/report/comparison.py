@@ -1,7 +1,7 @@
 """The page of a comparison: one HTML file that needs no network.
 
-Floor 6.  The text is comparison.html.jinja, in the report's style (page.css); the figure goes in as SVG.  The same comparison gives the
-same bytes but for the seconds.
+The text is comparison.html.jinja, in the report's style (page.css); the figure goes in as SVG. The same
+comparison gives the same bytes but for the seconds.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
-from orthoscope.evaluation.compare import Comparison, Standing
-from orthoscope.evaluation.conclusions import as_good_as_best, conclusions, with_error
-from orthoscope.report.numbers import ABSENT, pixels
+from orthoscope.evaluation.comparison.compare import Comparison, Standing
+from orthoscope.evaluation.comparison.conclusions import as_good_as_best, conclusions, with_error
+from orthoscope.geometry.numbers import ABSENT, pixels
 from orthoscope.version import __version__
 
 if TYPE_CHECKING:
@@ -42,7 +42,10 @@ def rows(comparison: Comparison) -> list[Row]:
     """The table, the best first."""
     judged, as_good = comparison.judged, as_good_as_best(comparison)
     best = judged[0] if judged else None
-    return [_row(each, "best" if each is best else "as good" if each in as_good else "") for each in comparison.standings]
+    return [
+        _row(each, "best" if each is best else "as good" if each in as_good else "")
+        for each in comparison.standings
+    ]
 
 
 def comparison_page(comparison: Comparison) -> str:
@@ -72,7 +75,11 @@ def _template() -> Template:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("orthoscope", "report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("orthoscope", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template("comparison.html.jinja")
 
@@ -88,10 +95,12 @@ def _svg(comparison: Comparison) -> str:
 def _row(standing: Standing, verdict: str) -> Row:
     judged = standing.held_out_px == standing.held_out_px
     return Row(
-        name=standing.entrant.name,
+        name=standing.entry.name,
         verdict=verdict,
         held_out=with_error(standing.held_out_px, standing.error_px) if judged else ABSENT,
-        loses=with_error(standing.loses_px, standing.loses_error_px) if judged and verdict != "best" else ABSENT,
+        loses=(
+            with_error(standing.loses_px, standing.loses_error_px) if judged and verdict != "best" else ABSENT
+        ),
         nce=_number(standing.nce, ".3f"),
         used=pixels(standing.rms_px),
         parameters=_number(standing.parameters, ".0f"),

@@ -1,7 +1,7 @@
 """How much of the world fits on the photograph, as angles.
 
-Floor 6.  A row of pixels sweeps a fan of rays; its opening is the sum of the angles between neighbours, so it may pass 180 degrees, and
-parts of the row without rays (beyond a lens's domain) add nothing.
+A row of pixels sweeps a fan of rays; its opening is the sum of the angles between neighbours, so it may pass
+180 degrees, and parts of the row without rays (beyond a lens's domain) add nothing.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ class FieldOfView(NamedTuple):
 
 
 def field_of_view(camera: Camera) -> FieldOfView:
-    """Angles between the outer edges of the frame: along the row and the column of the principal point, and between opposite corners.
+    """Angles between the outer edges of the frame: along the row and the column of the principal point, and
+    between opposite corners.
 
     The diagonal is the larger of the two.
     """
@@ -38,7 +39,9 @@ def field_of_view(camera: Camera) -> FieldOfView:
         for at, side in zip((camera.intrinsics.cx, camera.intrinsics.cy), camera.image_size, strict=True)
     )
     diagonals = _swept(camera, (left, top), (right, bottom)), _swept(camera, (left, bottom), (right, top))
-    return FieldOfView(_swept(camera, (left, y), (right, y)), _swept(camera, (x, top), (x, bottom)), max(diagonals))
+    return FieldOfView(
+        _swept(camera, (left, y), (right, y)), _swept(camera, (x, top), (x, bottom)), max(diagonals)
+    )
 
 
 def _swept(camera: Camera, start: tuple[float, float], end: tuple[float, float]) -> float:

@@ -1,7 +1,8 @@
 """The report: one HTML file that needs no network, from an evaluation.
 
-Floor 6.  The text is page.html.jinja with page.css; figures go in as SVG, photographs as data URIs; a policy in the page itself forbids
-the browser to load anything else.  The same evaluation gives the same bytes: nothing of the day or the machine goes in.
+The text is page.html.jinja with page.css; figures go in as SVG, photographs as data URIs; a policy in the
+page itself forbids the browser to load anything else. The same evaluation gives the same bytes: nothing of
+the day or the machine goes in.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orthoscope.evaluation.evaluate import Evaluation
+from orthoscope.files.whole_files import write_text
 from orthoscope.geometry.arrays import ndarray
-from orthoscope.io.files import write_text
 from orthoscope.report import tables
 from orthoscope.report.shape import shape_rows
 
@@ -61,11 +62,17 @@ def write_report(evaluation: Evaluation, path: str | Path, *, photograph: Photog
 
 @cache
 def _template() -> Template:
-    """The page's template, everything escaped that is put into it; imported late, since most verbs make no page."""
+    """The page's template, everything escaped that is put into it; imported late, since most verbs make no
+    page.
+    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("orthoscope", "report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("orthoscope", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template("page.html.jinja")
 
@@ -78,7 +85,12 @@ def _plates(evaluation: Evaluation) -> list[dict[str, object]]:
     from orthoscope.report.plates import PLATES
 
     return [
-        {"title": p.title, "caption": p.caption, "wide": p.wide, "svg": Markup(to_svg(p.draw(evaluation), p.name))}
+        {
+            "title": p.title,
+            "caption": p.caption,
+            "wide": p.wide,
+            "svg": Markup(to_svg(p.draw(evaluation), p.name)),
+        }
         for p in PLATES
         if p.suits(evaluation)
     ]

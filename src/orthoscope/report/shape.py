@@ -1,15 +1,16 @@
 """The estimated shape of a target in words and numbers: how large, how far from flat, how far from true.
 
-Floor 6.  The part in the plane that a print has (paper that shrank along one side, a scanner that was skew) is the symmetric linear part of
-the displacements without the common scale: stretch is how much longer y is than x, shear the angle by which the axes are not square.
+The part in the plane that a print has (paper that shrank along one side, a scanner that was skew) is the
+symmetric linear part of the displacements without the common scale: stretch is how much longer y is than x,
+shear the angle by which the axes are not square.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Bool, Float, ndarray
-from orthoscope.methods.calibration import Calibration
 
 __all__ = ["corners_seen", "shape_rows"]
 
@@ -43,8 +44,14 @@ def corners_seen(calibration: Calibration) -> Bool[ndarray, " m"]:
     return seen
 
 
-def _stretch_and_shear(points: Float[ndarray, "n 3"], displacements: Float[ndarray, "n 3"]) -> tuple[float, float]:
-    """How much longer y is than x, as a share; and the angle by which their right angle is smaller, radians."""
+def _stretch_and_shear(
+    points: Float[ndarray, "n 3"], displacements: Float[ndarray, "n 3"]
+) -> tuple[float, float]:
+    """How much longer y is than x, as a share; and the angle by which their right angle is smaller,
+    radians.
+    """
     plane = np.column_stack([points[:, :2] - points[:, :2].mean(0), np.ones(len(points))])
-    linear = np.linalg.lstsq(plane, displacements[:, :2], rcond=None)[0][:2]  # of x by x, y by x; x by y, y by y
+    linear = np.linalg.lstsq(plane, displacements[:, :2], rcond=None)[0][
+        :2
+    ]  # of x by x, y by x; x by y, y by y
     return float(linear[1, 1] - linear[0, 0]), float(linear[0, 1] + linear[1, 0])

@@ -1,6 +1,6 @@
 """What an evaluation says in numbers: the cards at the top of the page and its tables, ready to be printed.
 
-Floor 6.  Every text here is plain; the page escapes it.
+Every text here is plain; the page escapes it.
 """
 
 from __future__ import annotations
@@ -11,12 +11,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from orthoscope.evaluation.evaluate import Evaluation
-from orthoscope.methods.calibration import Calibration
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.geometry.numbers import (
+    ABSENT,
+    degrees,
+    percent,
+    pixels,
+    probability,
+    setting,
+    value_with_deviation,
+)
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import lens_name as lens_kind
 from orthoscope.report.field_of_view import field_of_view
-from orthoscope.report.numbers import ABSENT, degrees, percent, pixels, probability, setting, value_with_deviation
 
 __all__ = [
     "CandidateRow",
@@ -61,7 +69,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class ViewRow:
-    """A row of the table of photographs, errors in pixels; `suspicion` is why it does not belong, else empty."""
+    """A row of the table of photographs, errors in pixels; `suspicion` is why it does not belong, else
+    empty.
+    """
 
     number: int
     image: str
@@ -74,7 +84,8 @@ class ViewRow:
 
 @dataclass(frozen=True)
 class MisfitRow:
-    """A row of the table of misfits: of what, the part that views agree on and the part that they do not (px), F, F by chance, p-values.
+    """A row of the table of misfits: of what, the part that views agree on and the part that they do not
+    (px), F, F by chance, p-values.
 
     moves: by how much the image of the camera is off for it, pixels, where that is known.
     """
@@ -91,7 +102,9 @@ class MisfitRow:
 
 @dataclass(frozen=True)
 class CandidateRow:
-    """A row of what was tried: target shape, lens, held-out error, its standard error and what it loses against the one taken, px."""
+    """A row of what was tried: target shape, lens, held-out error, its standard error and what it loses
+    against the one taken, px.
+    """
 
     target: str
     lens: str
@@ -112,27 +125,46 @@ def cards(evaluation: Evaluation) -> list[Card]:
             "px",
             f"rms per point; median {pixels(evaluation.median_px)}, largest {pixels(evaluation.largest_px)}",
         ),
-        Card("NCE", pixels(evaluation.nce), "", "normalised calibration error; 1 is what rounding to whole pixels alone would give"),
+        Card(
+            "NCE",
+            pixels(evaluation.nce),
+            "",
+            "normalised calibration error; 1 is what rounding to whole pixels alone would give",
+        ),
         Card("Coverage", percent(evaluation.coverage), "", "of the frame's cells have corners in them"),
-        Card("Photographs", str(len(each)), "used", f"{len(detections.set_aside)} set aside, {len(evaluation.suspects)} suspect"),
+        Card(
+            "Photographs",
+            str(len(each)),
+            "used",
+            f"{len(detections.set_aside)} set aside, {len(evaluation.suspects)} suspect",
+        ),
         Card("Corners", str(detections.corners), "", f"{_range(each)} in a photograph"),
     ]
 
 
 def parameters(calibration: Calibration) -> list[Parameter]:
-    """Intrinsics, the lens's own frame where it has one, the lens's coefficients, with standard deviations where they were estimated.
+    """Intrinsics, the lens's own frame where it has one, the lens's coefficients, with standard deviations
+    where they were estimated.
 
     Coefficients that were not estimated and are zero are left to `lens_rows`.
     """
     camera = calibration.camera
     rows = [(name, getattr(camera.intrinsics, name), "px") for name in ("fx", "fy", "cx", "cy", "skew")]
     if camera.lens_frame is not None:
-        rows += [(f"lens_{name}", getattr(camera.lens_frame, name), "px") for name in ("fx", "fy", "cx", "cy", "skew")]
+        rows += [
+            (f"lens_{name}", getattr(camera.lens_frame, name), "px")
+            for name in ("fx", "fy", "cx", "cy", "skew")
+        ]
     unused = _unused(calibration)
     coefficients = zip(camera.lens.names(), camera.lens.coefficients.tolist(), strict=True)
-    rows += [(name, value, "rad" if name in ANGLES else "") for name, value in coefficients if name not in unused]
+    rows += [
+        (name, value, "rad" if name in ANGLES else "") for name, value in coefficients if name not in unused
+    ]
     deviations = calibration.uncertainty.deviations
-    return [Parameter(name, *_value(value, deviations.get(name), bool(deviations)), unit, repr(float(value))) for name, value, unit in rows]
+    return [
+        Parameter(name, *_value(value, deviations.get(name), bool(deviations)), unit, repr(float(value)))
+        for name, value, unit in rows
+    ]
 
 
 def lens_rows(calibration: Calibration) -> list[tuple[str, str]]:
@@ -140,7 +172,7 @@ def lens_rows(calibration: Calibration) -> list[tuple[str, str]]:
     camera = calibration.camera
     angles = field_of_view(camera)
     rows = [
-        ("formula", (inspect.getdoc(type(camera.lens)) or "").partition("\n")[0]),
+        ("formula", " ".join((inspect.getdoc(type(camera.lens)) or "").partition("\n\n")[0].split())),
         ("field of view, horizontal", degrees(angles.horizontal)),
         ("field of view, vertical", degrees(angles.vertical)),
         ("field of view, diagonal", degrees(angles.diagonal)),
@@ -153,7 +185,9 @@ def lens_rows(calibration: Calibration) -> list[tuple[str, str]]:
 def warnings(evaluation: Evaluation) -> list[str]:
     """The warnings that neither the assumptions nor the suspects say already."""
     said = [*evaluation.calibration.assumptions, *(reason for _, reason in evaluation.suspects)]
-    return [sentence for sentence in evaluation.warnings if not any(words and words in sentence for words in said)]
+    return [
+        sentence for sentence in evaluation.warnings if not any(words and words in sentence for words in said)
+    ]
 
 
 def misfit_rows(evaluation: Evaluation) -> list[MisfitRow]:
@@ -191,7 +225,9 @@ def view_rows(evaluation: Evaluation) -> list[ViewRow]:
     suspects = dict(evaluation.suspects)
     errors = {view.image: view for view in evaluation.views}
     rows = []
-    for i, (view, residuals) in enumerate(zip(calibration.detections.views, calibration.residuals(), strict=True)):
+    for i, (view, residuals) in enumerate(
+        zip(calibration.detections.views, calibration.residuals(), strict=True)
+    ):
         size = np.hypot(*residuals.T)
         size = size[np.isfinite(size)]
         error = errors.get(view.image)
@@ -225,8 +261,18 @@ def _held_out(evaluation: Evaluation) -> Card:
         return Card("Error held out", ABSENT, "", "not done: no photograph could be kept back")
     value, error = value_with_deviation(evaluation.held_out_rms_px, evaluation.held_out_error_px)
     if error == ABSENT:
-        return Card("Error held out", pixels(evaluation.held_out_rms_px), "px", "rms per point on photographs that were not used")
-    return Card("Error held out", value, f"± {error} px", "rms per point on photographs that were not used; ± one standard error")
+        return Card(
+            "Error held out",
+            pixels(evaluation.held_out_rms_px),
+            "px",
+            "rms per point on photographs that were not used",
+        )
+    return Card(
+        "Error held out",
+        value,
+        f"± {error} px",
+        "rms per point on photographs that were not used; ± one standard error",
+    )
 
 
 def _range(counts: list[int]) -> str:

@@ -1,14 +1,15 @@
 """Levenberg-Marquardt over one shared block and one block for each view; it knows no camera.
 
-Floor 2.  With s the shared step, v_j the step of view j, and sums over all measurements (weighted by the loss):
+With s the shared step, v_j the step of view j, and sums over all measurements (weighted by the loss):
 
-    [ A    B_1 ... B_m ] [ s  ]     [ a   ]        A = S^T S,  B_j = S^T V_j,  C_j = V_j^T V_j,  a = S^T e,  c_j = V_j^T e
-    [ B_1' C_1         ] [ v_1]  = -[ c_1 ]
+    [ A    B_1 ... B_m ] [ s  ]     [ a   ]        A = S^T S,  B_j = S^T V_j,  C_j = V_j^T V_j,
+    [ B_1' C_1         ] [ v_1]  = -[ c_1 ]        a = S^T e,  c_j = V_j^T e
     [ ...        ...   ] [ ...]     [ ... ]
 
-The views are eliminated: (A - sum B_j C_j^-1 B_j') s = -(a - sum B_j C_j^-1 c_j), then v_j = -C_j^-1 (c_j + B_j' s).  Damping adds lambda
-times the diagonal (D. Marquardt, 1963) or times the identity (K. Levenberg, 1944); lambda follows the gain ratio, actual over predicted
-reduction (H. B. Nielsen, IMM-REP-1999-05).  A problem owns its unknowns: it forms these sums at a place and moves along a step.
+The views are eliminated: (A - sum B_j C_j^-1 B_j') s = -(a - sum B_j C_j^-1 c_j), then v_j = -C_j^-1 (c_j +
+B_j' s). Damping adds lambda times the diagonal (D. Marquardt, 1963) or times the identity (K. Levenberg,
+1944); lambda follows the gain ratio, actual over predicted reduction (H. B. Nielsen, IMM-REP-1999-05). A
+problem owns its unknowns: it forms these sums at a place and moves along a step.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ __all__ = ["NormalEquations", "Options", "Problem", "Solution", "Status", "share
 Unknowns = TypeVar("Unknowns")
 
 LEAST_DAMPING, MOST_DAMPING = 1e-15, 1e12
-OPEN = 1e-14  # an eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured in its direction
+# an eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured in its
+# direction
+OPEN = 1e-14
 TAKES_PART = 1e-8  # share (squared) of such a direction from which on an unknown is open too
 
 
@@ -53,7 +56,9 @@ class Problem(Protocol[Unknowns]):
         """The sums at `unknowns`; a cost that is not finite says that there is no solution there."""
         ...
 
-    def move(self, unknowns: Unknowns, shared: Float[ndarray, " k"], views: Float[ndarray, "m p"]) -> Unknowns:
+    def move(
+        self, unknowns: Unknowns, shared: Float[ndarray, " k"], views: Float[ndarray, "m p"]
+    ) -> Unknowns:
         """The unknowns after a step (rotations step on their manifold)."""
         ...
 
@@ -63,7 +68,10 @@ class Status(StrEnum):
 
     CONVERGED = "converged"
     STEP_LIMIT = "stopped at the step limit; raise max_steps or give a better start"
-    STUCK = "stopped where only tiny steps lower the cost, short of a minimum; give a better start or fewer unknowns"
+    STUCK = (
+        "stopped where only tiny steps lower the cost, short of a minimum; give a better start or fewer"
+        " unknowns"
+    )
     NO_COST = "could not start: the cost at the starting values is not finite"
 
 
@@ -71,12 +79,12 @@ class Status(StrEnum):
 class Options:
     """How to solve.
 
-    tolerance: stop when a step promises to lower the cost by no more than this share of it.  floor: or by no more than this, absolutely,
-    in the residual's unit squared (noise-free data).  damping: lambda at the start.  damp: "diagonal" or "identity".  trusting: whether the
-    last step, known by how promises shrink, is taken without forming the sums after it; the solution's are then those before it, and its
-    cost is what that step promised.
-    progress: called after each step that lowered the cost, with (step, cost).
-    Raises InputError where damp is another word.
+    tolerance: stop when a step promises to lower the cost by no more than this share of it. floor: or by no
+    more than this, absolutely, in the residual's unit squared (noise-free data). damping: lambda at the
+    start. damp: "diagonal" or "identity". trusting: whether the last step, known by how promises shrink, is
+    taken without forming the sums after it; the solution's are then those before it, and its cost is what
+    that step promised. progress: called after each step that lowered the cost, with (step, cost). Raises
+    InputError where damp is another word.
     """
 
     max_steps: int = 100
@@ -107,8 +115,12 @@ class Solution(Generic[Unknowns]):
         return self.sums.cost
 
 
-def solve(problem: Problem[Unknowns], start: Unknowns, *, loss: Loss | None = None, options: Options | None = None) -> Solution[Unknowns]:
-    """The unknowns that minimise the problem's cost, near the start; the solution's status says how it ended."""
+def solve(
+    problem: Problem[Unknowns], start: Unknowns, *, loss: Loss | None = None, options: Options | None = None
+) -> Solution[Unknowns]:
+    """The unknowns that minimise the problem's cost, near the start; the solution's status says how it
+    ended.
+    """
     loss, options = loss or Linear(), options or Options()
     here, sums = start, problem.linearise(start, loss)
     if not np.isfinite(sums.cost):
@@ -121,7 +133,9 @@ def solve(problem: Problem[Unknowns], start: Unknowns, *, loss: Loss | None = No
         steps += 1
         if options.trusting and (last := _last_step(sums, promised, before, options)):
             shared, views, promised = last
-            return Solution(problem.move(here, shared, views), _lowered(sums, promised), steps, Status.CONVERGED)
+            return Solution(
+                problem.move(here, shared, views), _lowered(sums, promised), steps, Status.CONVERGED
+            )
         before = 0.0
         there, trial, gained = here, sums, -np.inf
         if 0.0 < promised < np.inf:
@@ -140,13 +154,14 @@ def solve(problem: Problem[Unknowns], start: Unknowns, *, loss: Loss | None = No
 def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray, "k k"]:
     """Covariance of the shared unknowns for noise as large as the residuals found.
 
-    measurements: how many numbers were measured (two for each corner).  The variance is cost / (measurements - unknowns).  Rows and
-    columns of unknowns that the data leave open are infinite.
+    measurements: how many numbers were measured (two for each corner). The variance is cost / (measurements -
+    unknowns). Rows and columns of unknowns that the data leave open are infinite.
     """
     unknowns = sums.a.size + sums.c.size
     variance = sums.cost / max(measurements - unknowns, 1)
     eliminated, _ = _eliminate(sums, sums.A, _inverse(sums.C))
-    scale = np.sqrt(_weights(sums.A, "diagonal"))  # conditioning is judged between unknowns of like size
+    # conditioning is judged between unknowns of like size
+    scale = np.sqrt(_weights(sums.A, "diagonal"))
     values, vectors = np.linalg.eigh(eliminated / np.outer(scale, scale))
     covariance = variance * (vectors / np.maximum(values, OPEN)) @ vectors.T / np.outer(scale, scale)
     is_open = (vectors[:, values <= OPEN] ** 2).sum(1) > TAKES_PART
@@ -155,9 +170,11 @@ def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray
 
 
 class _Damping:
-    """lambda, after Nielsen: less the better a step kept its promise, more and ever faster after steps that raised the cost.
+    """lambda, after Nielsen: less the better a step kept its promise, more and ever faster after steps that
+    raised the cost.
 
-    Faster than his: a narrow valley (rational lenses have them) is walked with hardly any damping and left with a lot.
+    Faster than his: a narrow valley (rational lenses have them) is walked with hardly any damping and left
+    with a lot.
     """
 
     def __init__(self, value: float) -> None:
@@ -173,10 +190,16 @@ class _Damping:
         self.value, self._growth = self._growth * max(self.value, 1e-12), 4.0 * self._growth
 
 
-def _ending(sums: NormalEquations, promised: float, damping: float, steps: int, options: Options) -> Status | None:
-    """Whether to end, and how: a damped step that promises nothing is only a minimum if one as free as the first promises nothing too."""
+def _ending(
+    sums: NormalEquations, promised: float, damping: float, steps: int, options: Options
+) -> Status | None:
+    """Whether to end, and how: a damped step that promises nothing is only a minimum if one as free as the
+    first promises nothing too.
+    """
     if _is_little(promised, sums, options):
-        free = promised if damping <= options.damping else _damped_step(sums, options.damping, options.damp)[2]
+        free = (
+            promised if damping <= options.damping else _damped_step(sums, options.damping, options.damp)[2]
+        )
         return Status.CONVERGED if _is_little(free, sums, options) else Status.STUCK
     if damping > MOST_DAMPING:
         return Status.STUCK
@@ -188,15 +211,21 @@ def _is_little(promised: float, sums: NormalEquations, options: Options) -> bool
     return abs(promised) <= options.tolerance * sums.cost + options.floor
 
 
-def _last_step(sums: NormalEquations, promised: float, before: float, options: Options) -> tuple[ndarray, ndarray, float] | None:
-    """The undamped step, where promises that go on shrinking as they have since the step `before` are little after it; else None."""
+def _last_step(
+    sums: NormalEquations, promised: float, before: float, options: Options
+) -> tuple[ndarray, ndarray, float] | None:
+    """The undamped step, where promises that go on shrinking as they have since the step `before` are little
+    after it; else None.
+    """
 
     def is_last(promised: float) -> bool:
         return 0.0 < promised < before and _is_little(promised * promised / before, sums, options)
 
     if not is_last(promised):
         return None
-    step = _damped_step(sums, LEAST_DAMPING, options.damp)  # in a flat valley it is the damping that makes a promise small
+    step = _damped_step(
+        sums, LEAST_DAMPING, options.damp
+    )  # in a flat valley it is the damping that makes a promise small
     return step if is_last(step[2]) else None
 
 
@@ -206,7 +235,9 @@ def _lowered(sums: NormalEquations, promised: float) -> NormalEquations:
 
 
 def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndarray, ndarray, float]:
-    """Shared step, view steps, and the reduction of the cost that the quadratic model promises; NaN where there is no such step."""
+    """Shared step, view steps, and the reduction of the cost that the quadratic model promises; NaN where
+    there is no such step.
+    """
     of_shared, of_views = damping * _weights(sums.A, damp), damping * _weights(sums.C, damp)
     try:
         inverse = np.linalg.inv(sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2]))
@@ -220,7 +251,9 @@ def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndar
 
 
 def _eliminate(sums: NormalEquations, A: ndarray, inverse: ndarray) -> tuple[ndarray, ndarray]:
-    """The shared system and its right side after the views are eliminated.  inverse: C^-1 of each view; it and A may be damped."""
+    """The shared system and its right side after the views are eliminated. inverse: C^-1 of each view; it and
+    A may be damped.
+    """
     m, k, p = sums.B.shape
     B = sums.B.transpose(1, 0, 2).reshape(k, m * p)
     Y = (sums.B @ inverse).transpose(1, 0, 2).reshape(k, m * p)
@@ -228,7 +261,9 @@ def _eliminate(sums: NormalEquations, A: ndarray, inverse: ndarray) -> tuple[nda
 
 
 def _inverse(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:
-    """The inverse of each block; in a direction where nothing was measured, what rounding would have measured there."""
+    """The inverse of each block; in a direction where nothing was measured, what rounding would have measured
+    there.
+    """
     scale = np.sqrt(_weights(C, "diagonal"))
     values, vectors = np.linalg.eigh(C / (scale[:, :, None] * scale[:, None, :]))
     vectors = vectors / scale[:, :, None]

@@ -1,7 +1,7 @@
 """Robust losses: what a squared residual costs, and the weight that makes least squares minimise that cost.
 
-Floor 2.  q = |e|^2 of one measurement, c the scale (in the residual's unit); rho(q) ~ q for q << c^2; weight = d rho / d q.
-P. Huber, Robust Statistics, 1981; F. Hampel et al., Robust Statistics, 1986.
+q = |e|^2 of one measurement, c the scale (in the residual's unit); rho(q) ~ q for q << c^2; weight = d rho /
+d q. P. Huber, Robust Statistics, 1981; F. Hampel et al., Robust Statistics, 1986.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ class Loss(ABC):
 
     def __post_init__(self) -> None:
         if not self.scale > 0:
-            raise InputError(f"a loss of scale {self.scale} weighs nothing; expected a positive scale, in pixels.")
+            raise InputError(
+                f"a loss of scale {self.scale} weighs nothing; expected a positive scale, in pixels."
+            )
 
     @abstractmethod
     def cost(self, squared: ndarray) -> ndarray:

@@ -1,6 +1,6 @@
 """Arrows that are true to scale: magnified by a round number, with a key that says by how much.
 
-Floor 6.  The unit of the axes is that of the arrows: pixels over a photograph, millimetres over a target.
+The unit of the axes is that of the arrows: pixels over a photograph, millimetres over a target.
 """
 
 from __future__ import annotations
@@ -40,15 +40,26 @@ def frame_key(axes: Axes, image_size: tuple[int, int], magnification: float, wor
     """The scale above a photograph's frame, pixels."""
     width, height = image_size
     diagonal = float(np.hypot(width, height))
-    draw_key(axes, (0.01 * width, -0.035 * height), diagonal, magnification, f"{{:g}} px   ({words}, magnified {magnification:g} times)")
+    draw_key(
+        axes,
+        (0.01 * width, -0.035 * height),
+        diagonal,
+        magnification,
+        f"{{:g}} px   ({words}, magnified {magnification:g} times)",
+    )
 
 
-def draw_key(axes: Axes, place: tuple[float, float], diagonal: float, magnification: float, words: str) -> None:
-    """An arrow of a round length, up to a tenth of the diagonal, at a place, and beside it the words with that length in them.
+def draw_key(
+    axes: Axes, place: tuple[float, float], diagonal: float, magnification: float, words: str
+) -> None:
+    """An arrow of a round length, up to a tenth of the diagonal, at a place, and beside it the words with
+    that length in them.
 
     Not by `quiverkey`, which before matplotlib 3.9 draws as many arrows as the figure has.
     """
     x, y = place
     length = round_below(0.1 * diagonal / magnification)
-    axes.quiver([x], [y], [length], [0.0], color=INK, width=0.003, clip_on=False, **true_to_scale(magnification))
+    axes.quiver(
+        [x], [y], [length], [0.0], color=INK, width=0.003, clip_on=False, **true_to_scale(magnification)
+    )
     axes.text(x + magnification * length + 0.012 * diagonal, y, words.format(length), va="center")

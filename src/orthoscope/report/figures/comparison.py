@@ -1,6 +1,7 @@
 """Methods and lenses side by side: the error of each, and what each loses against the best.
 
-Floor 6.  Both axes are logarithmic where errors differ by more than WIDE; that of the losses is then linear up to where losses matter.
+Both axes are logarithmic where errors differ by more than WIDE; that of the losses is then linear up to where
+losses matter.
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from orthoscope.evaluation.compare import Comparison, Standing
+from orthoscope.evaluation.comparison.compare import Comparison, Standing
 from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, note, styled
 
 __all__ = ["comparison_errors"]
 
-WIDTH, EACH, AROUND = 11.9, 0.36, 1.1  # inches: the page's two columns; for each entrant; for titles and axes
+WIDTH, EACH, AROUND = 11.9, 0.36, 1.1  # inches: the page's two columns; for each entry; for titles and axes
 WIDE = 4.0
 SURE = 2.0  # standard errors, as far as bars reach: what they leave out is hardly chance
 LINEAR = 0.2  # of the best's error: losses below this are drawn to scale
@@ -23,13 +24,15 @@ LINEAR = 0.2  # of the best's error: losses below this are drawn to scale
 
 @styled
 def comparison_errors(comparison: Comparison) -> Figure:
-    """Left, rms px per point on photographs held out and on those used, best on top; right, the loss against the best, paired by view."""
+    """Left, rms px per point on photographs held out and on those used, best on top; right, the loss against
+    the best, paired by view.
+    """
     standings = comparison.standings
     figure = Figure(figsize=(WIDTH, AROUND + EACH * max(len(standings), 3)))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     _errors(left, comparison)
     _losses(right, comparison)
-    left.set_yticks(range(len(standings)), [standing.entrant.name for standing in standings])
+    left.set_yticks(range(len(standings)), [standing.entry.name for standing in standings])
     left.set_ylim(max(len(standings), 1) - 0.4, -0.6)
     for axes in (left, right):
         axes.grid(axis="x")
@@ -37,7 +40,9 @@ def comparison_errors(comparison: Comparison) -> Figure:
     for row, standing in enumerate(standings):
         if not np.isfinite(standing.held_out_px):
             place = {"transform": left.get_yaxis_transform(), "va": "center", "color": GREY}
-            left.text(0.01, row, "no camera" if standing.calibration is None else "not in every view", **place)
+            left.text(
+                0.01, row, "no camera" if standing.calibration is None else "not in every view", **place
+            )
     return figure
 
 
@@ -47,7 +52,9 @@ def _errors(axes: Axes, comparison: Comparison) -> None:
         note(axes, "nobody could be judged")
         return
     rows, standings = zip(*judged, strict=True)
-    held_out, used = (np.array([getattr(standing, of) for standing in standings]) for of in ("held_out_px", "rms_px"))
+    held_out, used = (
+        np.array([getattr(standing, of) for standing in standings]) for of in ("held_out_px", "rms_px")
+    )
     bars = SURE * np.nan_to_num([standing.error_px for standing in standings])
     axes.scatter(used, rows, s=26, color=BLUE, label="on photographs that were used", zorder=5)
     marks = {"fmt": "o", "color": ORANGE, "ms": 5.5, "lw": 1.4, "label": "held out, ± 2 standard errors"}
@@ -84,4 +91,8 @@ def _losses(axes: Axes, comparison: Comparison) -> None:
 
 def _rows(comparison: Comparison) -> list[tuple[int, Standing]]:
     """Those with an error, and in which row they stand."""
-    return [(row, standing) for row, standing in enumerate(comparison.standings) if np.isfinite(standing.held_out_px)]
+    return [
+        (row, standing)
+        for row, standing in enumerate(comparison.standings)
+        if np.isfinite(standing.held_out_px)
+    ]

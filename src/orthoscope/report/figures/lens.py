@@ -1,8 +1,9 @@
 """What the lens does: its curve from the axis outwards, and how far it moves each place of the frame.
 
-Floor 6.  The ideal image of a ray is its place in the lens's own chart through K: a pin-hole's image for lenses of the plane, an
-equidistant one (r = f theta) for lenses of the angle.  Displacement is image minus ideal, pixels; negative along the radius is
-barrel, positive is pincushion.  All figures come from `project` and `unproject` alone, so any lens can be shown.
+The ideal image of a ray is its place in the lens's own chart through K: a pin-hole's image for lenses of the
+plane, an equidistant one (r = f theta) for lenses of the angle. Displacement is image minus ideal, pixels;
+negative along the radius is barrel, positive is pincushion. All figures come from `project` and `unproject`
+alone, so any lens can be shown.
 """
 
 from __future__ import annotations
@@ -11,11 +12,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orthoscope.evaluation.difference import image_difference
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.methods.calibration import Calibration
 from orthoscope.models.camera import Camera, image_border
 from orthoscope.models.charts import GNOMONIC
+from orthoscope.models.difference import image_difference
 from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, RED, WIDTH, frame_figure, note, styled
 from orthoscope.report.figures.vector_map import vector_map
 
@@ -27,9 +28,11 @@ BEYOND = 1.12  # the curve is drawn this much farther than the frame's farthest 
 
 @styled
 def distortion_curve(calibration: Calibration) -> Figure:
-    """Distance from the principal point and radial displacement (px) against the angle from the axis (degrees).
+    """Distance from the principal point and radial displacement (px) against the angle from the axis
+    (degrees).
 
-    Bands span all directions around the axis.  Marked: the farthest corner that was seen, the frame's farthest pixel, the lens's end.
+    Bands span all directions around the axis. Marked: the farthest corner that was seen, the frame's farthest
+    pixel, the lens's end.
     """
     camera = calibration.camera
     figure = Figure(figsize=(WIDTH, 4.9))
@@ -50,13 +53,21 @@ def distortion_curve(calibration: Calibration) -> Figure:
         axes.grid()
         _marks(axes, calibration, angles[-1], edge)
     above.set(xlim=(0.0, np.rad2deg(angles[-1])), ylim=(0.0, 1.25 * float(np.nanmax(radius))))
-    figure.legend(*above.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.8, columnspacing=1.2)
+    figure.legend(
+        *above.get_legend_handles_labels(),
+        loc="outside upper left",
+        ncols=3,
+        handlelength=1.8,
+        columnspacing=1.2,
+    )
     return figure
 
 
 @styled
 def displacement_map(calibration: Calibration) -> Figure:
-    """How far, and whereto, the lens moves each place of the frame from its ideal image (px); grey where no ray falls."""
+    """How far, and whereto, the lens moves each place of the frame from its ideal image (px); grey where no
+    ray falls.
+    """
     camera = calibration.camera
     ideal = "pin-hole" if camera.lens.chart is GNOMONIC else "equidistant"
     figure, axes = frame_figure(camera.image_size)
@@ -74,7 +85,9 @@ def displacement_map(calibration: Calibration) -> Figure:
 
 @styled
 def lens_difference(camera: Camera, other: Camera) -> Figure:
-    """How far, and whereto, `other` sees what `camera` sees at each place of its frame (px), a common rotation apart."""
+    """How far, and whereto, `other` sees what `camera` sees at each place of its frame (px), a common
+    rotation apart.
+    """
     figure, axes = frame_figure(camera.image_size)
     vector_map(
         figure,
@@ -89,7 +102,9 @@ def lens_difference(camera: Camera, other: Camera) -> Figure:
 
 
 def _principal_point(axes: Axes, camera: Camera) -> None:
-    axes.plot(camera.intrinsics.cx, camera.intrinsics.cy, "+", color=ORANGE, ms=10, mew=1.6, label="principal point")
+    axes.plot(
+        camera.intrinsics.cx, camera.intrinsics.cy, "+", color=ORANGE, ms=10, mew=1.6, label="principal point"
+    )
     axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.2)
 
 
@@ -98,11 +113,20 @@ def _ideal(camera: Camera, rays: Float[ndarray, "n 3"]) -> Float[ndarray, "n 2"]
     return camera.intrinsics.to_pixels(np.stack(camera.lens.chart.flatten(*rays.T), axis=-1))
 
 
-def _along_angles(camera: Camera, angles: Float[ndarray, " a"]) -> tuple[Float[ndarray, "a d"], Float[ndarray, "a d"]]:
-    """For each angle and direction: distance of the image from the principal point, and how much of it the lens added."""
+def _along_angles(
+    camera: Camera, angles: Float[ndarray, " a"]
+) -> tuple[Float[ndarray, "a d"], Float[ndarray, "a d"]]:
+    """For each angle and direction: distance of the image from the principal point, and how much of it the
+    lens added.
+    """
     phi = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     rays = np.stack(
-        np.broadcast_arrays(np.sin(angles[:, None]) * np.cos(phi), np.sin(angles[:, None]) * np.sin(phi), np.cos(angles[:, None])), axis=-1
+        np.broadcast_arrays(
+            np.sin(angles[:, None]) * np.cos(phi),
+            np.sin(angles[:, None]) * np.sin(phi),
+            np.cos(angles[:, None]),
+        ),
+        axis=-1,
     ).reshape(-1, 3)
     centre = np.array([camera.intrinsics.cx, camera.intrinsics.cy])
     image, ideal = camera.project(rays) - centre, _ideal(camera, rays) - centre
@@ -112,10 +136,14 @@ def _along_angles(camera: Camera, angles: Float[ndarray, " a"]) -> tuple[Float[n
 
 
 def _band(axes: Axes, angles: ndarray, values: Float[ndarray, "a d"], label: str) -> None:
-    """The mean over the directions as a line inside the band of all of them, as far as every direction has an image."""
+    """The mean over the directions as a line inside the band of all of them, as far as every direction has an
+    image.
+    """
     whole = np.isfinite(values).all(-1)
     degrees, values = np.rad2deg(angles[whole]), values[whole]
-    axes.fill_between(degrees, values.min(-1), values.max(-1), color=BLUE, alpha=0.22, linewidth=0, label=None)
+    axes.fill_between(
+        degrees, values.min(-1), values.max(-1), color=BLUE, alpha=0.22, linewidth=0, label=None
+    )
     axes.plot(degrees, values.mean(-1), color=BLUE, lw=1.7, label=label)
 
 
@@ -125,8 +153,17 @@ def _ideals(axes: Axes, camera: Camera, angles: ndarray, top: float) -> None:
     front = angles < np.pi / 2 - 1e-3
     pin_hole = focal * np.tan(angles[front])
     shown = pin_hole < 2 * top
-    axes.plot(np.rad2deg(angles[front][shown]), pin_hole[shown], color=GREY, lw=1.0, ls=(0, (4, 3)), label="pin-hole, f tan θ")
-    axes.plot(np.rad2deg(angles), focal * angles, color=GREY, lw=1.0, ls=(0, (1, 2)), label="equidistant, f θ")
+    axes.plot(
+        np.rad2deg(angles[front][shown]),
+        pin_hole[shown],
+        color=GREY,
+        lw=1.0,
+        ls=(0, (4, 3)),
+        label="pin-hole, f tan θ",
+    )
+    axes.plot(
+        np.rad2deg(angles), focal * angles, color=GREY, lw=1.0, ls=(0, (1, 2)), label="equidistant, f θ"
+    )
 
 
 def _marks(axes: Axes, calibration: Calibration, last: float, edge: float) -> None:
@@ -148,9 +185,13 @@ def _marks(axes: Axes, calibration: Calibration, last: float, edge: float) -> No
 
 
 def _outline(camera: Camera) -> Float[ndarray, "n 2"]:
-    """Pixels of the frame's border and of a coarse grid inside, which still has rays where an image circle lies within the frame."""
+    """Pixels of the frame's border and of a coarse grid inside, which still has rays where an image circle
+    lies within the frame.
+    """
     width, height = camera.image_size
-    inside = np.stack(np.meshgrid(np.linspace(0, width - 1, 65), np.linspace(0, height - 1, 65)), axis=-1).reshape(-1, 2)
+    inside = np.stack(
+        np.meshgrid(np.linspace(0, width - 1, 65), np.linspace(0, height - 1, 65)), axis=-1
+    ).reshape(-1, 2)
     return np.concatenate([image_border(camera.image_size), inside])
 
 

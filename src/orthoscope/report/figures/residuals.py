@@ -1,7 +1,7 @@
 """Where the camera misses the corners: over the frame, by place, by photograph.
 
-Floor 6.  A residual is predicted minus detected, pixels; an arrow starts at the detected corner and points to the predicted one.
-Corners that the camera gives no image (NaN) are left out.
+A residual is predicted minus detected, pixels; an arrow starts at the detected corner and points to the
+predicted one. Corners that the camera gives no image (NaN) are left out.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orthoscope.evaluation.cells import cells_for
 from orthoscope.evaluation.evaluate import Evaluation
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.methods.calibration import Calibration
+from orthoscope.geometry.cells import cells_for
 from orthoscope.report.figures.arrows import frame_key, round_magnification, true_to_scale
 from orthoscope.report.figures.style import BLUE, DENSE, EMPTY, INK, ORANGE, RED, frame_figure, note, styled
 
@@ -53,7 +53,9 @@ def residual_vectors(calibration: Calibration) -> Figure:
 
 @styled
 def residuals_by_place(evaluation: Evaluation) -> Figure:
-    """Cells of the frame coloured by their rms residual, with the mean residual as an arrow; of held-out residuals where there are any."""
+    """Cells of the frame coloured by their rms residual, with the mean residual as an arrow; of held-out
+    residuals where there are any.
+    """
     calibration = evaluation.calibration
     figure, axes = frame_figure(calibration.camera.image_size)
     kind, pixels, residuals = _fairest(evaluation)
@@ -65,7 +67,13 @@ def residuals_by_place(evaluation: Evaluation) -> Figure:
     spread = np.where(told, np.sqrt(cells.mean(pixels, (residuals**2).sum(-1))), np.nan)
     axes.set_facecolor(EMPTY)
     shown = axes.pcolormesh(
-        cells.x_edges, cells.y_edges, np.ma.masked_invalid(spread), cmap="viridis_r", vmin=0.0, edgecolors="face", linewidth=0.2
+        cells.x_edges,
+        cells.y_edges,
+        np.ma.masked_invalid(spread),
+        cmap="viridis_r",
+        vmin=0.0,
+        edgecolors="face",
+        linewidth=0.2,
     )
     figure.colorbar(shown, ax=axes, label=f"{kind} rms (px per point)", pad=0.02, shrink=0.9, aspect=32)
     means = np.stack([cells.mean(pixels, residuals[:, i])[told] for i in range(2)], axis=-1)
@@ -75,7 +83,9 @@ def residuals_by_place(evaluation: Evaluation) -> Figure:
 
 @styled
 def lens_misfit(evaluation: Evaluation) -> Figure:
-    """What the views agree on at each place of the image, whatever corner is there, px: what the formula cannot follow."""
+    """What the views agree on at each place of the image, whatever corner is there, px: what the formula
+    cannot follow.
+    """
     misfit, image_size = evaluation.misfit.lens, evaluation.calibration.camera.image_size
     figure, axes = frame_figure(image_size)
     axes.set_facecolor(EMPTY)
@@ -88,10 +98,25 @@ def lens_misfit(evaluation: Evaluation) -> Figure:
         return figure
     x, y = misfit.cells.x_edges, misfit.cells.y_edges
     top = max(float(np.nanmax(size)), misfit.test.noise_px)  # what noise hides looks pale
-    shown = axes.pcolormesh(x, y, np.ma.masked_invalid(size), cmap="viridis_r", vmin=0.0, vmax=top, edgecolors="face", linewidth=0.2)
+    shown = axes.pcolormesh(
+        x,
+        y,
+        np.ma.masked_invalid(size),
+        cmap="viridis_r",
+        vmin=0.0,
+        vmax=top,
+        edgecolors="face",
+        linewidth=0.2,
+    )
     figure.colorbar(shown, ax=axes, label="systematic residual (px)", pad=0.02, shrink=0.9, aspect=32)
     told = np.isfinite(size)
-    _mean_arrows(axes, evaluation.calibration, misfit.cells.centres[told], misfit.residuals[told], "systematic residual")
+    _mean_arrows(
+        axes,
+        evaluation.calibration,
+        misfit.cells.centres[told],
+        misfit.residuals[told],
+        "systematic residual",
+    )
     return figure
 
 
@@ -110,10 +135,17 @@ def residuals_by_view(evaluation: Evaluation) -> Figure:
     if odd.any():
         axes.bar(place[odd], train[odd], width=0.72, color=RED, label="suspect")
     if np.isfinite(held_out).any():
-        axes.scatter(place, held_out, s=16, color=ORANGE, edgecolor="white", linewidth=0.5, zorder=3, label="held out")
-    for value, colour, words in ((evaluation.rms_px, BLUE, "all"), (evaluation.held_out_rms_px, ORANGE, "all held out")):
+        axes.scatter(
+            place, held_out, s=16, color=ORANGE, edgecolor="white", linewidth=0.5, zorder=3, label="held out"
+        )
+    for value, colour, words in (
+        (evaluation.rms_px, BLUE, "all"),
+        (evaluation.held_out_rms_px, ORANGE, "all held out"),
+    ):
         if np.isfinite(value):
-            axes.axhline(value, color=colour, lw=0.9, ls=(0, (4, 3)), zorder=0, label=f"{words}, {value:.3g} px")
+            axes.axhline(
+                value, color=colour, lw=0.9, ls=(0, (4, 3)), zorder=0, label=f"{words}, {value:.3g} px"
+            )
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderaxespad=0.2, handlelength=1.6)
     axes.set(ylabel="rms residual (px per point)", xlim=(-0.7, max(len(views), 6) - 0.3))
     axes.set_ylim(bottom=0.0)
@@ -123,9 +155,13 @@ def residuals_by_view(evaluation: Evaluation) -> Figure:
 
 
 def _name_views(axes: Axes, names: list[str], odd: ndarray, tops: ndarray) -> None:
-    """Names below the bars, or numbers where there are many and names above the suspects' bars (`tops`, px) only."""
+    """Names below the bars, or numbers where there are many and names above the suspects' bars (`tops`, px)
+    only.
+    """
     if len(names) <= NAMED:
-        axes.set_xticks(np.arange(len(names)), [_shortened(name) for name in names], rotation=90 if len(names) > 8 else 0)
+        axes.set_xticks(
+            np.arange(len(names)), [_shortened(name) for name in names], rotation=90 if len(names) > 8 else 0
+        )
         axes.set_xlabel("photograph (name)")
         labels = axes.get_xticklabels()
         for i in np.flatnonzero(odd):
@@ -136,7 +172,16 @@ def _name_views(axes: Axes, names: list[str], odd: ndarray, tops: ndarray) -> No
     axes.set_xlabel("photograph (number in the table below)")
     for i in np.flatnonzero(odd & np.isfinite(tops)):
         place = (float(i), float(tops[i]))
-        axes.annotate(_shortened(names[i]), place, (0, 5), textcoords="offset points", rotation=90, ha="center", color=RED, fontsize=7)
+        axes.annotate(
+            _shortened(names[i]),
+            place,
+            (0, 5),
+            textcoords="offset points",
+            rotation=90,
+            ha="center",
+            color=RED,
+            fontsize=7,
+        )
     if odd.any():
         axes.set_ylim(top=1.35 * axes.get_ylim()[1])  # room for the names
 
@@ -145,7 +190,9 @@ def _shortened(name: str) -> str:
     return name if len(name) <= 16 else f"…{name[-15:]}"
 
 
-def _finite(calibration: Calibration, residuals: tuple[ndarray, ...]) -> tuple[Float[ndarray, "n 2"], Float[ndarray, "n 2"]]:
+def _finite(
+    calibration: Calibration, residuals: tuple[ndarray, ...]
+) -> tuple[Float[ndarray, "n 2"], Float[ndarray, "n 2"]]:
     """Detected pixels and residuals of all views together, without those that are NaN."""
     if not residuals:
         return np.empty((0, 2)), np.empty((0, 2))
@@ -156,7 +203,9 @@ def _finite(calibration: Calibration, residuals: tuple[ndarray, ...]) -> tuple[F
 
 
 def _fairest(evaluation: Evaluation) -> tuple[str, Float[ndarray, "n 2"], Float[ndarray, "n 2"]]:
-    """Held-out residuals where there are any, else those of the training; which they are, pixels, residuals."""
+    """Held-out residuals where there are any, else those of the training; which they are, pixels,
+    residuals.
+    """
     pixels, residuals = _finite(evaluation.calibration, evaluation.held_out_residuals)
     if len(pixels):
         return "held-out", pixels, residuals

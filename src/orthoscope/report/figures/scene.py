@@ -1,7 +1,7 @@
 """Where the boards were: the camera with its frustum and every board, in three dimensions.
 
-Floor 6.  Drawn as a photographer stands: the camera's x to the right, z (forward) into the page, y (down) downwards.  Matplotlib's axes
-are (right, into the page, up), hence (x, z, -y).
+Drawn as a photographer stands: the camera's x to the right, z (forward) into the page, y (down) downwards.
+Matplotlib's axes are (right, into the page, up), hence (x, z, -y).
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from orthoscope.evaluation.evaluate import Evaluation
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.geometry.target import Target
-from orthoscope.methods.calibration import Calibration
 from orthoscope.models.camera import Camera
 from orthoscope.report.figures.style import BLUE, INK, ORANGE, RED, WIDTH, styled
+from orthoscope.targets.detections import Target
 
 __all__ = ["board_poses"]
 
@@ -26,7 +26,9 @@ WIDEST = np.deg2rad(55.0)  # half the opening of the drawn frustum; a fisheye's 
 
 @styled
 def board_poses(evaluation: Evaluation) -> Figure:
-    """The boards as the camera saw them, metres, numbered as in the table of photographs; suspects stand out."""
+    """The boards as the camera saw them, metres, numbered as in the table of photographs; suspects
+    stand out.
+    """
     calibration = evaluation.calibration
     figure = Figure(figsize=(WIDTH, 4.7))
     figure.set_layout_engine("none")  # matplotlib's layouts do not know how far 3-D labels reach
@@ -40,7 +42,13 @@ def board_poses(evaluation: Evaluation) -> Figure:
     faces = [RED if is_odd else BLUE for is_odd in odd]
     if len(boards):
         axes.add_collection3d(
-            Poly3DCollection(boards, facecolors=faces, edgecolors=faces, alpha=float(np.clip(4 / len(boards), 0.05, 0.28)), linewidths=0.9)
+            Poly3DCollection(
+                boards,
+                facecolors=faces,
+                edgecolors=faces,
+                alpha=float(np.clip(4 / len(boards), 0.05, 0.28)),
+                linewidths=0.9,
+            )
         )
         axes.plot(*boards[:, 0].T, "o", ms=2.6, color=ORANGE, label="corner 0")
         axes.legend(loc="upper left", borderaxespad=0.0)
@@ -56,7 +64,11 @@ def _frame_scene(axes: Axes3D, points: Float[ndarray, "n 3"]) -> None:
     """One scale on all three axes, names and units as the camera's."""
     low, high = points.min(0), points.max(0)
     margin = 0.03 * float((high - low).max())
-    axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), zlim=(low[2] - margin, high[2] + margin))
+    axes.set(
+        xlim=(low[0] - margin, high[0] + margin),
+        ylim=(low[1] - margin, high[1] + margin),
+        zlim=(low[2] - margin, high[2] + margin),
+    )
     axes.set_box_aspect(high - low + 2 * margin)
     axes.set(xlabel="x, right (m)", ylabel="z, forward (m)", zlabel="y, down (m)")
     axes.zaxis.set_major_formatter(lambda value, _: f"{-value + 0.0:.4g}".replace("-", "\N{MINUS SIGN}"))
@@ -77,14 +89,18 @@ def _outline(target: Target) -> Float[ndarray, "4 3"]:
 
 
 def _frustum(camera: Camera, boards: Float[ndarray, "views 4 3"]) -> Float[ndarray, "8 2 3"]:
-    """The edges of the pyramid that the frame sees, camera frame; its depth a third of the nearest boards' distance."""
+    """The edges of the pyramid that the frame sees, camera frame; its depth a third of the nearest boards'
+    distance.
+    """
     width, height = camera.image_size
     intrinsics = camera.intrinsics
     pixels = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]) - 0.5
     plane = np.clip(intrinsics.to_plane(pixels), -np.tan(WIDEST), np.tan(WIDEST))
     depth = 1 / 3 * float(np.quantile(np.linalg.norm(boards.mean(1), axis=-1), 0.1)) if len(boards) else 1.0
     front = depth * np.concatenate([plane, np.ones((4, 1))], axis=-1)
-    return np.concatenate([np.stack([np.zeros((4, 3)), front], axis=1), np.stack([front, np.roll(front, -1, axis=0)], axis=1)])
+    return np.concatenate(
+        [np.stack([np.zeros((4, 3)), front], axis=1), np.stack([front, np.roll(front, -1, axis=0)], axis=1)]
+    )
 
 
 def _as_drawn(points: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3"]:

@@ -1,9 +1,9 @@
 """How every figure looks: palette, type, the image frame as axes, and the way to SVG.
 
-Floor 6.  Figures are made with matplotlib's objects alone (no pyplot, no current figure).  Settings hold only while a figure is
-drawn or saved and start from matplotlib's defaults, so that a user's matplotlibrc neither changes a figure nor is changed.
-Colours: M. Okabe and K. Ito, Color universal design, 2002; maps: cividis and viridis, which keep their order for colour-blind readers
-and in grey print.
+Figures are made with matplotlib's objects alone (no pyplot, no current figure). Settings hold only while a
+figure is drawn or saved and start from matplotlib's defaults, so that a user's matplotlibrc neither changes a
+figure nor is changed. Colours: M. Okabe and K. Ito, Color universal design, 2002; maps: cividis and viridis,
+which keep their order for colour-blind readers and in grey print.
 """
 
 from __future__ import annotations
@@ -18,7 +18,20 @@ from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-__all__ = ["BLUE", "DENSE", "GREY", "INK", "ORANGE", "RED", "SKY", "frame_axes", "frame_figure", "note", "styled", "to_svg"]
+__all__ = [
+    "BLUE",
+    "DENSE",
+    "GREY",
+    "INK",
+    "ORANGE",
+    "RED",
+    "SKY",
+    "frame_axes",
+    "frame_figure",
+    "note",
+    "styled",
+    "to_svg",
+]
 
 BLUE, SKY, ORANGE, RED, GREY, INK = "#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#8A9199", "#20262D"
 EMPTY = "#F1F2F4"  # places without data
@@ -90,7 +103,9 @@ def frame_figure(image_size: tuple[int, int]) -> tuple[Figure, Axes]:
 def frame_axes(axes: Axes, image_size: tuple[int, int]) -> None:
     """Axes that show the whole photograph, to the outer edges of its pixels."""
     width, height = image_size
-    axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5), aspect="equal", xlabel="x (px)", ylabel="y (px)")
+    axes.set(
+        xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5), aspect="equal", xlabel="x (px)", ylabel="y (px)"
+    )
     axes.spines[:].set_visible(True)
 
 
@@ -100,13 +115,17 @@ def note(axes: Axes, text: str) -> None:
 
 
 def to_svg(figure: Figure, name: str) -> str:
-    """The figure as an SVG element to be put into a page; its ids begin with `name`, so that two figures do not share any.
+    """The figure as an SVG element to be put into a page; its ids begin with `name`, so that two figures do
+    not share any.
 
-    The same figure gives the same text: no dates, no random ids.  Text names the family `var(--sans)`, which the page defines.
+    The same figure gives the same text: no dates, no random ids. Text names the family `var(--sans)`, which
+    the page defines.
     """
     buffer = io.StringIO()
     with style.context(["default", STYLE]):
-        figure.savefig(buffer, format="svg", dpi=DPI, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+        figure.savefig(
+            buffer, format="svg", dpi=DPI, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        )
     svg = buffer.getvalue()
     svg = svg[svg.index("<svg") :].replace("'DejaVu Sans'", "var(--sans)")
     svg = re.sub(r"<style.*?</style>", "", svg, count=1, flags=re.DOTALL)  # it would hold for the whole page

@@ -1,6 +1,6 @@
 """A vector at every place of the frame: its length as colour and contours, its direction as arrows.
 
-Floor 6.  The field is a function of pixels, sampled as finely as each of the three needs; NaN where it has no value.
+The field is a function of pixels, sampled as finely as each of the three needs; NaN where it has no value.
 """
 
 from __future__ import annotations
@@ -19,15 +19,21 @@ __all__ = ["vector_map"]
 Field = Callable[[Float[ndarray, "n 2"]], Float[ndarray, "n 2"]]
 
 
-def vector_map(figure: Figure, axes: Axes, image_size: tuple[int, int], *, field: Field, label: str, empty: str) -> None:
-    """Draw a field over the frame.  label: of the colours, with the unit.  empty: what to say where the field has no value anywhere."""
+def vector_map(
+    figure: Figure, axes: Axes, image_size: tuple[int, int], *, field: Field, label: str, empty: str
+) -> None:
+    """Draw a field over the frame. label: of the colours, with the unit. empty: what to say where the field
+    has no value anywhere.
+    """
     axes.set_facecolor(EMPTY)
     x, y, vectors = _sampled(image_size, field, 240)
     size = np.hypot(vectors[..., 0], vectors[..., 1])
     if not np.isfinite(size).any():
         note(axes, empty)
         return
-    shown = axes.pcolormesh(x, y, np.ma.masked_invalid(size), cmap="cividis", vmin=0.0, shading="nearest", rasterized=True)
+    shown = axes.pcolormesh(
+        x, y, np.ma.masked_invalid(size), cmap="cividis", vmin=0.0, shading="nearest", rasterized=True
+    )
     figure.colorbar(shown, ax=axes, label=label, pad=0.02, shrink=0.9, aspect=32)
     if np.nanmax(size) > 1e-9:
         _contours(axes, *_sampled(image_size, field, 80))
@@ -46,11 +52,17 @@ def _arrows(axes: Axes, x: ndarray, y: ndarray, vectors: ndarray) -> None:
     longest = float(np.nanmax(np.hypot(vectors[..., 0], vectors[..., 1]), initial=0.0))
     if longest > 0:
         scale = {"angles": "xy", "scale_units": "xy", "scale": longest / (x[1] - x[0])}
-        axes.quiver(x, y, *np.moveaxis(vectors, -1, 0), pivot="mid", color="white", alpha=0.75, width=0.003, **scale)
+        axes.quiver(
+            x, y, *np.moveaxis(vectors, -1, 0), pivot="mid", color="white", alpha=0.75, width=0.003, **scale
+        )
 
 
-def _sampled(image_size: tuple[int, int], field: Field, samples: int) -> tuple[ndarray, ndarray, Float[ndarray, "rows columns 2"]]:
-    """x and y of an even grid over the frame, pixels, and the field there.  samples: along the frame's longer side."""
+def _sampled(
+    image_size: tuple[int, int], field: Field, samples: int
+) -> tuple[ndarray, ndarray, Float[ndarray, "rows columns 2"]]:
+    """x and y of an even grid over the frame, pixels, and the field there. samples: along the frame's longer
+    side.
+    """
     width, height = image_size
     columns, rows = (max(2, round(samples * side / max(image_size))) for side in image_size)
     x = (np.arange(columns) + 0.5) / columns * width - 0.5

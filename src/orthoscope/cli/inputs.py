@@ -1,0 +1,56 @@
+"""Whatever holds corners, to Detections: photographs, our own detections.json, or a corners.vnl table.
+
+OpenCV is loaded for photographs only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+
+from orthoscope.formats.corners_vnl import read_vnl
+from orthoscope.formats.own.json import load_detections
+from orthoscope.geometry.arrays import InputError
+from orthoscope.targets.detections import Detections, Target, parse_target
+
+__all__ = ["detections_from"]
+
+
+def detections_from(
+    paths: Sequence[str | Path],
+    target: str | Target | None,
+    *,
+    image_size: tuple[int, int] | None = None,
+    jobs: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> tuple[Detections, dict[str, Path]]:
+    """Detections, and where the photograph of each name is (empty where corners were found before).
+
+    paths: photographs (files, folders, globs), or one .json of ours, or one .vnl. target: needed but for our
+    own file. image_size: needed with a .vnl, which does not know it. jobs, executor, progress: as in
+    `detect`. Raises InputError where something needed is missing.
+    """
+    if len(paths) == 1 and Path(paths[0]).suffix == ".json":
+        return load_detections(paths[0]), {}
+    if target is None:
+        raise InputError(
+            "no target was named; say what was photographed, such as --target chessboard:9x6:25mm (inner"
+            " corners, square)."
+        )
+    target = parse_target(target) if isinstance(target, str) else target
+    if len(paths) == 1 and Path(paths[0]).suffix == ".vnl":
+        if image_size is None:
+            raise InputError(
+                f"{paths[0]} does not say how large the photographs are; add their size, such as --image-size"
+                " 640x480."
+            )
+        return read_vnl(paths[0], target, image_size), {}
+    from orthoscope.detection.detect import detect
+    from orthoscope.files.images import names_of, photographs
+
+    files = photographs(paths)
+    return detect(files, target, jobs=jobs, executor=executor, progress=progress), dict(
+        zip(names_of(files), files, strict=True)
+    )

@@ -1,0 +1,199 @@
+"""Photographs to Detections: each is read, looked at and refined on its own, many at the same time.
+
+A photograph that cannot take part is set aside with the reason, and the others go on: one that cannot be
+read, one of another size than most, one that shows the same picture as another, one without the target.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections import Counter
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import nullcontext
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.detection.chessboard import board_size, find_chessboard
+from orthoscope.files.images import names_of, photographs, read_image
+from orthoscope.geometry.arrays import CalibrationError, InputError, ndarray
+from orthoscope.targets.detections import Detections, SetAside, Target, View, parse_target
+
+__all__ = ["DETECTORS", "detect"]
+
+Detector = Callable[[ndarray, Target], tuple[ndarray, ndarray] | None]
+LISTED = 5  # photographs whose reasons are told where none showed the target
+GUESSES = 3  # photographs that are then searched for boards of other sizes
+USUAL_BOARDS = (
+    (9, 6),
+    (8, 6),
+    (7, 6),
+    (8, 5),
+    (7, 5),
+    (6, 5),
+    (7, 7),
+    (6, 4),
+    (5, 4),
+    (10, 7),
+    (11, 8),
+    (12, 9),
+    (13, 9),
+    (14, 9),
+    (4, 3),
+)
+
+
+class _Look(NamedTuple):
+    """What one photograph came to: its size and a digest of its picture, and corners or the reason why there
+    are none.
+    """
+
+    size: tuple[int, int] | None
+    digest: str
+    found: tuple[ndarray, ndarray] | None
+    reason: str
+
+
+def detect(
+    paths: str | PathLike[str] | Iterable[str | PathLike[str]],
+    target: Target | str,
+    *,
+    jobs: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Detections:
+    """Find the target in photographs.
+
+    paths: files, folders and globs. target: or its description, such as `chessboard:9x6:25mm`. jobs:
+    photographs looked at at once (as many as there are cores), or an executor of one's own. progress: called
+    with (done, total, name). Raises InputError where paths or target are wrong, CalibrationError where no
+    photograph shows the target.
+    """
+    target = parse_target(target) if isinstance(target, str) else target
+    detector = _detector_for(target)
+    files = photographs(paths)
+    names = names_of(files)
+    looks: list[_Look] = []
+    with nullcontext(executor) if executor else ThreadPoolExecutor(jobs or os.cpu_count()) as run:
+        places = [file.absolute() for file in files]  # an executor's workers may stand in another folder
+        for look in run.map(_look, places, [target] * len(files), [detector] * len(files)):
+            looks.append(look)
+            if progress:
+                progress(len(looks), len(files), names[len(looks) - 1])
+    size = _usual_size(looks)
+    views, aside = _sorted_out(names, looks, size)
+    if not views or size is None:
+        raise CalibrationError(_nothing_found(files, names, looks, target, aside))
+    return Detections(target, size, tuple(views), tuple(aside))
+
+
+def _detect_chessboard(grey: ndarray, target: Target) -> tuple[ndarray, ndarray] | None:
+    assert target.grid is not None
+    corners = find_chessboard(grey, *target.grid)
+    return None if corners is None else (np.arange(len(corners)), corners)
+
+
+DETECTORS: dict[str, Detector] = {"chessboard": _detect_chessboard}
+
+
+def _detector_for(target: Target) -> Detector:
+    kind = target.name.partition(":")[0]
+    if kind not in DETECTORS:
+        raise InputError(
+            f"target {target.name!r} cannot be looked for in photographs; expected one of"
+            f" {', '.join(DETECTORS)}. Hand in corners instead."
+        )
+    return DETECTORS[kind]
+
+
+def _look(file: Path, target: Target, detector: Detector) -> _Look:
+    """One photograph, from its file to its corners (ids and pixels)."""
+    try:
+        grey = read_image(file, grey=True)
+    except InputError as error:
+        return _Look(None, "", None, str(error).removeprefix(f"{file} "))
+    size = (grey.shape[1], grey.shape[0])
+    found = detector(grey, target)
+    return _Look(
+        size,
+        hashlib.sha256(grey.tobytes()).hexdigest(),
+        found,
+        "" if found else f"{target.name} was not found in it",
+    )
+
+
+def _usual_size(looks: list[_Look]) -> tuple[int, int] | None:
+    """The size that most photographs have, among those that show the target where any does; of two, the
+    larger.
+    """
+    sizes = [look.size for look in looks if look.size and look.found] or [
+        look.size for look in looks if look.size
+    ]
+    if not sizes:
+        return None
+    counts = Counter(sizes)
+    return max(counts, key=lambda size: (counts[size], size[0] * size[1]))
+
+
+def _sorted_out(
+    names: list[str], looks: list[_Look], size: tuple[int, int] | None
+) -> tuple[list[View], list[SetAside]]:
+    """Views, and photographs set aside."""
+    views: list[View] = []
+    aside: list[SetAside] = []
+    first: dict[str, str] = {}
+    for name, look in zip(names, looks, strict=True):
+        if look.size and look.size != size and size:
+            aside.append(
+                SetAside(name, f"its size is {look.size[0]}x{look.size[1]}, most have {size[0]}x{size[1]}")
+            )
+        elif look.digest and look.digest in first:
+            aside.append(SetAside(name, f"the same picture as {first[look.digest]}"))
+        elif look.found is None:
+            aside.append(SetAside(name, look.reason))
+        else:
+            views.append(View(name, *look.found))
+        if look.digest:
+            first.setdefault(look.digest, name)
+    return views, aside
+
+
+def _nothing_found(
+    files: list[Path], names: list[str], looks: list[_Look], target: Target, aside: list[SetAside]
+) -> str:
+    """Why no photograph could be used, and which board seems to be there instead."""
+    readable = [file for file, look in zip(files, looks, strict=True) if look.size]
+    reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:LISTED])
+    if more := len(aside) - LISTED:
+        reasons += f"\n  and {more} more" if more > 0 else ""
+    if not readable:
+        return f"none of {len(files)} photographs can be read; expected images. Look at them:{reasons}"
+    told = f"{target.name} was found in none of {len(readable)} photographs; expected it in most of them."
+    if board := _board_instead(readable, target):
+        columns, rows = board
+        return (
+            f"{told} There seems to be a board of {columns}x{rows} inner corners in"
+            f" {readable[0].name if len(readable) == 1 else 'them'}: if that is the one, say --target"
+            f" chessboard:{columns}x{rows}:{target.name.rpartition(':')[2]}."
+        )
+    return (
+        f"{told} Count its inner corners (one fewer than squares, each way), and see that it is whole, sharp"
+        f" and lit:{reasons}"
+    )
+
+
+def _board_instead(files: list[Path], target: Target) -> tuple[int, int] | None:
+    """The size of the board that most of a few photographs show, where it is not the target's."""
+    columns, rows = target.grid or (0, 0)
+    near = [
+        (columns + i, rows + j) for i, j in ((-1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1), (-2, -2))
+    ]
+    guesses = [board for board in dict.fromkeys([*near, *USUAL_BOARDS]) if min(board) >= 3]
+    few = files[:: max(1, len(files) // GUESSES)][:GUESSES]
+    seen = Counter(board for file in few if (board := board_size(read_image(file, grey=True), guesses)))
+    others = {board: count for board, count in seen.items() if sorted(board) != sorted((columns, rows))}
+    return max(others, key=lambda board: others[board], default=None)

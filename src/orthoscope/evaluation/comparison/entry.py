@@ -1,0 +1,91 @@
+"""Who is compared, in the words of a user: a method, its lens, its settings.
+
+`METHOD`, `METHOD:LENS` with the lens as everywhere (`fccm:brown:k1,k2`), and any setting of the method's own
+by its name (`decoupled:target=flat`, `fccm:rational:loss=huber`).
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from orthoscope.geometry.arrays import InputError
+from orthoscope.methods import METHODS
+from orthoscope.models.lenses import parse_lens
+
+__all__ = ["USUAL", "Entry", "parse_entry"]
+
+USUAL = (
+    *METHODS,
+    "decoupled:target=free",
+    "decoupled:target=flat",
+    "fccm:rational",
+)  # fccm alone: brown, or kannala_brandt if wide
+CHOSEN = ("auto", "free")  # lenses that are in no table
+TRUTHS = {"true": True, "yes": True, "false": False, "no": False}
+
+
+class Entry(NamedTuple):
+    """A method with its settings, under the name that a user gave it."""
+
+    name: str
+    method: str
+    settings: Mapping[str, Any]
+
+
+def parse_entry(text: str) -> Entry:
+    """The entry of a description such as `fccm`, `fccm:brown`, `fccm:brown:k1,k2` or
+    `decoupled:brown:target=flat`.
+
+    Raises InputError for a method, a lens or a setting that is not there, and for a value that is none.
+    """
+    method, *parts = (part.strip() for part in text.strip().split(":"))
+    if method not in METHODS:
+        raise InputError(
+            f"method {method!r} is not known; expected one of {', '.join(METHODS)}, alone or as in"
+            " fccm:brown."
+        )
+    lens = ":".join(part for part in parts if "=" not in part)
+    if lens and lens not in CHOSEN:
+        parse_lens(lens)
+    settings: dict[str, Any] = {"lens": lens} if lens else {}
+    known = _settings_of(method)
+    for part in parts:
+        name, equals, value = part.partition("=")
+        if equals:
+            if name not in known:
+                raise InputError(f"method {method!r} has no setting {name!r}; it has {', '.join(known)}.")
+            settings[name] = _value(name, value, known[name])
+    return Entry(text.strip(), method, settings)
+
+
+def _settings_of(method: str) -> dict[str, Any]:
+    """The settings that can be written as text, with the values that they have when left alone."""
+    parameters = inspect.signature(METHODS[method]).parameters.values()
+    return {
+        each.name: each.default
+        for each in parameters
+        if isinstance(each.default, bool | int | float | str | tuple)
+    }
+
+
+def _value(name: str, text: str, usual: Any) -> Any:
+    """A value of the kind that the setting usually has; several are separated by commas."""
+    if isinstance(usual, tuple):
+        return tuple(_value(name, part, usual[0] if usual else "") for part in text.split(",") if part)
+    if isinstance(usual, str):
+        return text
+    try:
+        return TRUTHS[text.lower()] if isinstance(usual, bool) else type(usual)(text)
+    except (KeyError, ValueError) as error:
+        expected = (
+            "true or false"
+            if isinstance(usual, bool)
+            else "a whole number"
+            if isinstance(usual, int)
+            else "a number"
+        )
+        raise InputError(
+            f"setting {name!r} is {text!r}; expected {expected}, such as {name}={str(usual).lower()}."
+        ) from error

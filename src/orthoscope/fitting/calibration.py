@@ -1,0 +1,154 @@
+"""The result of every method: the camera, where the target was, what it was made from and how it ended.
+
+A calibration keeps its inputs, so that it can be recomputed, refitted with another lens and evaluated on its
+own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
+from orthoscope.geometry.pose import Pose
+from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import TargetShape
+from orthoscope.targets.detections import Detections, Target
+
+__all__ = ["Calibration", "Candidate", "Uncertainty", "points_of", "residuals_of", "rms"]
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """What the data leave open about the camera.
+
+    names: the parameters that were estimated, `fx`, `cx`, `k1`...; a parameter tied to another bears both
+    names, `fx=fy`. covariance: (k,k), in the parameters' own units, for residuals as large as those found.
+    """
+
+    names: tuple[str, ...]
+    covariance: ndarray
+
+    def __post_init__(self) -> None:
+        k = len(self.names)
+        object.__setattr__(self, "names", tuple(self.names))
+        object.__setattr__(
+            self, "covariance", frozen(np.reshape(self.covariance, (k, k)), (k, k), "covariance")
+        )
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """The standard deviation of each estimated parameter."""
+        roots = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return {
+            single: float(root)
+            for name, root in zip(self.names, roots, strict=True)
+            for single in name.split("=")
+        }
+
+
+class Candidate(NamedTuple):
+    """What a method tried: target shape and lens, held-out error with its standard error, pixels per point.
+
+    loses_px: its held-out error less that of the one that was taken.  NaN where no view could judge it.
+    """
+
+    target: str
+    lens: str
+    held_out_px: float
+    standard_error_px: float
+    loses_px: float
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A camera with the evidence for it.
+
+    camera_from_target: one pose for each of `detections.views`, in their order. method, settings: what was
+    called, so that it can be called again. status: how the solver ended, a sentence. steps: how many it took.
+    assumptions: what was taken for granted because the data could not tell, each a sentence. target_shape:
+    where the target's corners were found to be; flat where nothing is said. parameters: how many of camera
+    and shape the data determined, a real number where priors shared in it. candidates: what else was tried,
+    simplest first. free_camera: with the lens that no formula limits, where the camera's is a formula. Raises
+    InputError where poses and views, or the shape and the target, do not match in number.
+    """
+
+    camera: Camera
+    camera_from_target: tuple[Pose, ...]
+    detections: Detections
+    method: str
+    settings: Mapping[str, Any]
+    uncertainty: Uncertainty
+    status: str
+    steps: int
+    version: str
+    assumptions: tuple[str, ...] = ()
+    target_shape: TargetShape = None  # type: ignore[assignment]  # flat, made below for as many corners as there are
+    parameters: float = float("nan")  # the uncertainty's, where nothing is said
+    candidates: tuple[Candidate, ...] = ()
+    free_camera: Camera | None = None
+
+    def __post_init__(self) -> None:
+        corners = len(self.detections.target.points)
+        if self.target_shape is None:
+            object.__setattr__(self, "target_shape", TargetShape.flat(corners))
+        elif len(self.target_shape.displacements) != corners:
+            raise InputError(
+                f"a shape of {len(self.target_shape.displacements)} corners for a target of {corners};"
+                " expected one for each."
+            )
+        if np.isnan(self.parameters):
+            object.__setattr__(self, "parameters", float(len(self.uncertainty.names)))
+        object.__setattr__(self, "candidates", tuple(self.candidates))
+        object.__setattr__(self, "camera_from_target", tuple(self.camera_from_target))
+        if len(self.camera_from_target) != len(self.detections.views):
+            raise InputError(
+                f"{len(self.camera_from_target)} poses for {len(self.detections.views)} views; expected one"
+                " for each."
+            )
+
+    def residuals(self) -> tuple[Float[ndarray, "_ 2"], ...]:
+        """Predicted minus detected, pixels, an array (n,2) for each view; the formula's own value where its
+        domain has ended.
+        """
+        return residuals_of(self.camera, self.camera_from_target, self.detections, shape=self.target_shape)
+
+    @property
+    def target_points(self) -> Float[ndarray, "m 3"]:
+        """Where the target's corners are, metres, target frame: nominal points and what the shape adds."""
+        return points_of(self.detections.target, self.target_shape)
+
+    @property
+    def rms_px(self) -> float:
+        """Root mean square of |residual| over all corners, pixels (per point, as OpenCV's)."""
+        return rms(np.concatenate(self.residuals()))
+
+
+def points_of(target: Target, shape: TargetShape | None) -> Float[ndarray, "m 3"]:
+    """Where a target's corners are, metres, target frame; nominally where no shape is known."""
+    return target.points if shape is None else target.points + shape.displacements
+
+
+def residuals_of(
+    camera: Camera,
+    camera_from_target: Sequence[Pose],
+    detections: Detections,
+    *,
+    shape: TargetShape | None = None,
+) -> tuple[Float[ndarray, "_ 2"], ...]:
+    """Predicted minus detected, pixels, an array (n,2) for each view, for a camera and one pose for each
+    view.
+    """
+    points = points_of(detections.target, shape)
+    return tuple(
+        camera.project(pose.apply(points[view.ids]), beyond=True) - view.pixels
+        for pose, view in zip(camera_from_target, detections.views, strict=True)
+    )
+
+
+def rms(residuals: Float[ndarray, "n 2"]) -> float:
+    """Root mean square of |e| over points."""
+    return float(np.sqrt((residuals * residuals).sum(-1).mean()))

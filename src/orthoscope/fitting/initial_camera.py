@@ -1,0 +1,272 @@
+"""Where a joint calibration starts: a camera good enough for its wanted lens, found without being told
+anything.
+
+Two bases. *Pin-hole*: Zhang's closed form on the distorted corners. *Angle*: an equidistant lens, r_d =
+theta, at a few focal lengths, keeping the one whose rays fit the target's plane best; this one holds for any
+field of view, past 90 degrees too. Whichever base the corners prefer is refined a little where the wanted
+lens is of another kind, and then turned into it (lens_fit).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from orthoscope.fitting.closed_form import (
+    CENTRED_SQUARE,
+    GENERAL,
+    NO_SKEW,
+    intrinsics_of_homographies,
+    poses_of_camera,
+    poses_of_homographies,
+)
+from orthoscope.fitting.lens_fit import FOCAL, converted
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.geometry.projective import homographies_to_pixels
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.charts import GNOMONIC
+from orthoscope.models.lens import Formula
+from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
+from orthoscope.solve.least_squares import Options, solve
+from orthoscope.solve.losses import Cauchy
+
+__all__ = ["Assumptions", "StartingCameras", "starts", "suited_lens"]
+
+FIELDS = np.deg2rad(
+    [6, 12, 20, 30, 40, 60, 80, 100, 120, 140, 160, 180, 200, 220, 250]
+)  # diagonal fields of view that are tried
+SCANNED = 12  # views that the scan over them looks at
+SAMPLE = 48  # views that tell whether a base fits, and refine it
+# a pin-hole start that misses by less than this share of the diagonal is taken without looking further
+GOOD = 0.01
+WIDE = np.deg2rad(60.0)  # corners farther from the axis than this ask for a lens of the angle
+STEEP = np.deg2rad(88.0)  # rays farther out than this no lens of the plane is fitted to
+ALIKE: dict[
+    type[Formula], tuple[dict[str, float], ...]
+] = {  # coefficients of no distortion, in different valleys of the cost
+    Rational: ({}, {"k1": 1.0, "k4": 1.0}),
+}
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """What so few views cannot tell, and is assumed: which B are allowed, which parameters of K move, and the
+    sentences to show.
+    """
+
+    basis: ndarray
+    free: tuple[str, ...]
+    assumptions: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, views: int, *, skew: bool) -> Assumptions:
+        """The paper's section 3.1 (and Zhang's): one view, two views, more."""
+        if views == 1:
+            told = "one view: the principal point is taken at the image's centre, fx = fy and skew = 0"
+            return cls(CENTRED_SQUARE, ("fx=fy",), (told,))
+        if views == 2:
+            return cls(NO_SKEW, FOCAL, ("two views: skew is taken as 0",))
+        return cls(GENERAL, (*FOCAL, "skew")) if skew else cls(NO_SKEW, FOCAL)
+
+    def of_camera(self, K: Intrinsics) -> Intrinsics:
+        """K with what is assumed made exactly so."""
+        return replace(
+            K, fy=K.fx if "fx=fy" in self.free else K.fy, skew=K.skew if "skew" in self.free else 0.0
+        )
+
+
+class StartingCameras:
+    """The two base cameras for given corners, each with the poses that go with it; made when asked for, and
+    once.
+    """
+
+    def __init__(
+        self,
+        observations: Observations,
+        points: Float[ndarray, "p 3"],
+        image_size: tuple[int, int],
+        narrowing: Assumptions,
+    ) -> None:
+        self.observations, self.points, self.image_size, self.narrowing = (
+            observations,
+            points,
+            image_size,
+            narrowing,
+        )
+
+    @cached_property
+    def pinhole(self) -> Estimate | None:
+        """Zhang's closed form as a camera without distortion; where the full form fails, with the principal
+        point at the centre.
+        """
+        basis, observations = self.narrowing.basis, self.observations
+        plane = self.points[observations.ids, :2]
+        homographies = homographies_to_pixels(plane, observations.pixels(), observations.present)
+        for allowed in (
+            basis,
+            *(narrower for narrower in (NO_SKEW, CENTRED_SQUARE) if len(narrower) < len(basis)),
+        ):
+            K = intrinsics_of_homographies(homographies, self.image_size, allowed)
+            if K is not None and _plausible(K, self.image_size):
+                camera = Camera(self.image_size, self.narrowing.of_camera(K), Brown())
+                return Estimate(
+                    camera, poses_of_homographies(np.linalg.solve(camera.intrinsics.matrix, homographies))
+                )
+        return None
+
+    @cached_property
+    def pinhole_fits(self) -> bool:
+        """Whether the pin-hole misses the corners by so little that its lens will do the rest."""
+        return self.pinhole is not None and self.misfit(self.pinhole) < GOOD * float(
+            np.hypot(*self.image_size)
+        )
+
+    @cached_property
+    def angle(self) -> Estimate | None:
+        """The equidistant camera, principal point at the centre, whose focal length suits the corners
+        best.
+        """
+        some = self.observations.only(self.observations.evenly(SCANNED))
+        diagonal = float(np.hypot(*self.image_size))
+        tried = [_equidistant(self.image_size, diagonal / field) for field in FIELDS]
+        misfits = [
+            _misfit(Estimate(camera, poses_of_camera(camera, some, self.points)), some, self.points)
+            for camera in tried
+        ]
+        best = int(np.argmin(misfits))
+        return self.posed(tried[best]) if np.isfinite(misfits[best]) else None
+
+    def misfit(self, base: Estimate) -> float:
+        """rms, pixels, by which a base misses the corners of some of the views; infinite where it sees a
+        corner nowhere.
+        """
+        rows = self.observations.evenly(SAMPLE)
+        return _misfit(
+            Estimate(base.camera, base.poses.only(rows)), self.observations.only(rows), self.points
+        )
+
+    def refined(self, base: Estimate) -> Camera:
+        """A base camera with its own lens's first coefficients fitted, robustly, in a few steps, to some of
+        the views.
+        """
+        rows = self.observations.evenly(SAMPLE)
+        camera, some = base.camera, self.observations.only(rows)
+        problem = Reprojection(some, self.points, camera, (*self.narrowing.free, *camera.lens.free[:2]))
+        loss, options = Cauchy(0.002 * max(self.image_size)), Options(max_steps=30, tolerance=1e-6)
+        return solve(
+            problem, Estimate(camera, base.poses.only(rows)), loss=loss, options=options
+        ).unknowns.camera
+
+    def rays(self, camera: Camera) -> Float[ndarray, "n 3"]:
+        """Rays of a few thousand of the observed pixels, evenly picked; those that there are."""
+        pixels = self.observations.pixels()[self.observations.present > 0]
+        rays = camera.unproject(pixels[:: max(1, len(pixels) // 2000)])
+        return rays[np.isfinite(rays[:, 0])]
+
+    def posed(self, camera: Camera) -> Estimate:
+        """A camera with its closed-form poses."""
+        return Estimate(camera, poses_of_camera(camera, self.observations, self.points))
+
+
+def starts(
+    bases: StartingCameras, lens: type[Formula], *, coefficients: Sequence[str] | None = None
+) -> list[Estimate]:
+    """Where to start from to get a camera with the wanted lens, the likelier first.
+
+    coefficients: those that will move, by default what the lens frees; the others have their usual values.
+    Raises CalibrationError where the corners fit no camera, or lie where the wanted lens cannot see.
+    """
+    coefficients = lens.free if coefficients is None else coefficients
+    if lens.chart is GNOMONIC and bases.pinhole is not None and bases.pinhole_fits:
+        return _with_lens(bases, bases.pinhole, lens, coefficients)
+    found: list[Estimate] = []
+    for base in sorted((base for base in (bases.angle, bases.pinhole) if base is not None), key=bases.misfit):
+        try:
+            found += _with_lens(bases, base, lens, coefficients)
+        except CalibrationError:
+            if not found:  # the likeliest base says that the lens cannot see these corners
+                raise
+    if not found:
+        raise CalibrationError(
+            "the corners fit no camera at all: neither a pin-hole nor a fisheye sees them as images of a flat"
+            " target. Check that the target's columns and rows are right and that the corners are listed in"
+            " order."
+        )
+    return found
+
+
+def suited_lens(bases: StartingCameras) -> str:
+    """The lens for someone who named none: `brown`, or `kannala_brandt` where corners lie more than WIDE from
+    the axis.
+    """
+    if bases.pinhole_fits or bases.angle is None:
+        return "brown"
+    rays = bases.rays(bases.refined(bases.angle))
+    return "kannala_brandt" if rays[:, 2].min(initial=1.0) < np.cos(WIDE) else "brown"
+
+
+def _plausible(K: Intrinsics, image_size: tuple[int, int]) -> bool:
+    """Whether K could belong to a camera that takes such images: its shape within 2, its principal point
+    within the frame.
+    """
+    longer = max(image_size)
+    return (
+        0.1 * longer < K.fx < 100 * longer
+        and 0.5 < K.fx / K.fy < 2.0
+        and 0 < K.cx < image_size[0]
+        and 0 < K.cy < image_size[1]
+    )
+
+
+def _equidistant(image_size: tuple[int, int], focal: float) -> Camera:
+    width, height = image_size
+    return Camera(
+        image_size, Intrinsics(focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)), KannalaBrandt()
+    )
+
+
+def _misfit(estimate: Estimate, observations: Observations, points: Float[ndarray, "p 3"]) -> float:
+    """rms, pixels, of the corners about where the camera sees the target; infinite where it sees some corner
+    nowhere.
+    """
+    camera, (rotation, translation) = estimate
+    seen = points[observations.ids] @ rotation.transpose(0, 2, 1) + translation[:, None]
+    e = camera.project(seen.reshape(-1, 3), beyond=True) - observations.pixels().reshape(-1, 2)
+    misfit = float(np.sqrt((e * e).sum(1)[observations.present.ravel() > 0].mean()))
+    return misfit if np.isfinite(misfit) else np.inf
+
+
+def _with_lens(
+    bases: StartingCameras, base: Estimate, lens: type[Formula], coefficients: Sequence[str]
+) -> list[Estimate]:
+    """A base with the wanted lens: as it is where that lens contains the base's own, else refined and
+    converted.
+    """
+    if isinstance(base.camera.lens, lens) or (isinstance(base.camera.lens, Brown) and lens is Rational):
+        alike = [same for same in ALIKE.get(lens, ({},)) if set(same) <= set(coefficients)]
+        return [Estimate(replace(base.camera, lens=lens(**same)), base.poses) for same in alike]
+    refined = bases.refined(base)
+    rays = bases.rays(refined)
+    if lens.chart is GNOMONIC:
+        rays = _before_steep(rays, lens)
+    return [bases.posed(converted(refined, lens, rays, free=(*bases.narrowing.free, *coefficients)))]
+
+
+def _before_steep(rays: Float[ndarray, "n 3"], lens: type[Formula]) -> Float[ndarray, "m 3"]:
+    """Rays without the few that lie beside or behind the camera; more than a few no lens of the plane can
+    see.
+    """
+    flat = rays[:, 2] > np.cos(STEEP)
+    if flat.mean() < 0.99:
+        farthest = np.degrees(np.arccos(rays[:, 2].min()))
+        raise CalibrationError(
+            f"these corners lie up to {farthest:.0f} degrees from the axis, where the lens"
+            f" {lens.__name__.lower()!r} cannot see (it ends before 90). Use a lens of the angle: --lens"
+            " kannala_brandt."
+        )
+    return rays[flat]

@@ -1,0 +1,91 @@
+"""Which views can take part in a calibration, and why the others cannot.
+
+A view must fix a homography: four corners of which no three are on a line, so at least two off every line of
+the target; and it must not be seen edge-on, where all pixels are on a line too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from math import hypot
+
+import numpy as np
+
+from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.targets.detections import Detections, SetAside, View
+
+__all__ = ["with_usable_views"]
+
+FEWEST = 4  # corners that a homography needs
+THINNEST = 0.01  # of a view's length in the image is its width at least
+
+
+def with_usable_views(detections: Detections) -> Detections:
+    """The detections without the views that tell nothing or tell it twice; those are set aside with the
+    reason.
+
+    Raises CalibrationError where no view is left.
+    """
+    kept: list[View] = []
+    aside: list[SetAside] = list(detections.set_aside)
+    seen: dict[bytes, str] = {}
+    off_a_line = cache(
+        lambda ids: _off_a_line(detections.target.points[np.frombuffer(ids, np.int64), :2])
+    )  # most boards are whole, and alike
+    for view in detections.views:
+        content = view.ids.tobytes() + view.pixels.tobytes()
+        if reason := _fault(view, off_a_line):
+            aside.append(SetAside(view.image, reason))
+        elif content in seen:
+            aside.append(SetAside(view.image, f"the same corners as {seen[content]}"))
+        else:
+            seen[content] = view.image
+            kept.append(view)
+    if not kept:
+        reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:5])
+        raise CalibrationError(
+            f"no view of {detections.target.name} can be used; expected at least 1, better 15 from different"
+            f" sides. Take photographs that show the whole target, sharp and large.{reasons}"
+        )
+    return replace(detections, views=tuple(kept), set_aside=tuple(aside))
+
+
+def _fault(view: View, off_a_line: Callable[[bytes], int]) -> str | None:
+    """Why a view tells nothing; None where it does.  off_a_line: of the ids of its corners."""
+    if len(view.ids) < FEWEST:
+        return f"{len(view.ids)} corners; a view needs {FEWEST}"
+    off = off_a_line(view.ids.tobytes())
+    if off < 2:
+        return f"all its corners{' but one' if off else ''} are on one line of the target"
+    if _thin(view.pixels):
+        return "all its corners are on one line in the image: the target is seen edge-on"
+    return None
+
+
+def _off_a_line(points: Float[ndarray, "n 2"]) -> int:
+    """How many points are off the line that has most of them, where that is none or one; else more
+    than one.
+    """
+    fewest = len(points)
+    for a, b in (
+        (0, 1),
+        (0, 2),
+        (1, 2),
+    ):  # a line that misses one point at most goes through two of the first three
+        (along_x, along_y), (x, y) = points[b] - points[a], (points - points[a]).T
+        if along_x or along_y:
+            off = np.abs(along_x * y - along_y * x) > 1e-9 * (x * x + y * y).max()
+            fewest = min(fewest, int(off.sum()))
+    return fewest
+
+
+def _thin(pixels: Float[ndarray, "n 2"]) -> bool:
+    """Whether pixels are all but on a line, or all at one place."""
+    offsets = pixels - pixels.sum(0) / len(pixels)
+    (xx, xy), (_, yy) = (offsets.T @ offsets).tolist()
+    longest = 0.5 * (xx + yy) + hypot(
+        0.5 * (xx - yy), xy
+    )  # the larger eigenvalue; their product is the determinant
+    return xx * yy - xy * xy <= THINNEST**2 * longest * longest

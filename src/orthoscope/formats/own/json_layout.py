@@ -1,0 +1,67 @@
+"""How our JSON files look: indented for people, but a list of numbers is one line and a table of numbers one
+line a row.
+
+Numbers are written as the shortest text that reads back as the same number, as Python writes it, so files are
+exact and the same each time. Long tables are left to msgspec, which is ten times as fast and differs where
+numbers are very small or very large.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import msgspec
+
+__all__ = ["lay_out"]
+
+WIDTH = 120  # an object of plain values that fits stays on one line
+OTHERWISE = (
+    "e",
+    "0.0000",
+    "n",
+    '"',
+    "{",
+)  # in msgspec's text: numbers that Python writes in another way, NaN, what is no number
+
+
+def lay_out(value: Any, indent: str = "") -> str:
+    """JSON text of plain values: dict, list, str, numbers, bool, None.
+
+    Raises ValueError for NaN and infinity, TypeError for anything else that JSON has no word for.
+    """
+    inner = indent + "  "
+    entries = (
+        list(value.values() if isinstance(value, dict) else value)
+        if isinstance(value, dict | list | tuple)
+        else []
+    )
+    if not any(isinstance(entry, dict | list | tuple) for entry in entries):
+        line = _line(value)
+        if not isinstance(value, dict) or len(indent) + len(line) <= WIDTH:
+            return line
+    if isinstance(value, dict):
+        return _block(
+            "{}", [f"{_line(str(key))}: {lay_out(entry, inner)}" for key, entry in value.items()], indent
+        )
+    if isinstance(entries[0], list | tuple):
+        line = _table(value)
+        if (
+            not line.startswith("[[[") and '"' not in line and "{" not in line
+        ):  # a table of numbers, at once since it may be long
+            return _block("[]", [line[1:-1].replace("], [", f"],\n{inner}[")], indent)
+    return _block("[]", [lay_out(entry, inner) for entry in entries], indent)
+
+
+def _block(brackets: str, lines: list[str], indent: str) -> str:
+    return f"{brackets[0]}\n{indent}  " + f",\n{indent}  ".join(lines) + f"\n{indent}{brackets[1]}"
+
+
+def _line(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _table(value: Any) -> str:
+    """The same as `_line`, sooner for many numbers."""
+    text = msgspec.json.encode(value).decode()
+    return _line(value) if any(sign in text for sign in OTHERWISE) else text.replace(",", ", ")

@@ -1,0 +1,72 @@
+"""Numbers as people read them: as many digits as mean something, and a dash where there is no number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence, Set
+from typing import Any
+
+import numpy as np
+
+__all__ = ["ABSENT", "degrees", "percent", "pixels", "probability", "setting", "value_with_deviation"]
+
+ABSENT = "\N{EN DASH}"
+
+
+def pixels(value: float) -> str:
+    """An error in pixels, three digits or so."""
+    if not math.isfinite(value):
+        return ABSENT
+    return (
+        f"{value:.3f}"
+        if 0.01 <= abs(value) < 1 or value == 0
+        else f"{value:.3g}"
+        if abs(value) < 1000
+        else f"{value:.0f}"
+    )
+
+
+def percent(share: float) -> str:
+    """A share of one, in whole percent."""
+    return f"{100 * share:.0f} %" if math.isfinite(share) else ABSENT
+
+
+def probability(p: float) -> str:
+    """A probability, two digits; one that is next to nothing is only said to be below a thousandth."""
+    if not math.isfinite(p):
+        return ABSENT
+    return "< 0.001" if p < 0.001 else f"{p:.2g}"
+
+
+def degrees(angle: float) -> str:
+    """An angle given in radians."""
+    return f"{math.degrees(angle):.1f}°" if math.isfinite(angle) else ABSENT
+
+
+def value_with_deviation(value: float, deviation: float) -> tuple[str, str]:
+    """A value to the digit where its standard deviation has its second; six digits where there is none."""
+    if not math.isfinite(deviation) or deviation <= 0:
+        return f"{value:.6g}", ABSENT
+    decimals = min(max(0, 1 - math.floor(math.log10(deviation))), 12)
+    return (
+        f"{round(value, decimals) + 0.0:.{decimals}f}",
+        f"{deviation:.{decimals}f}",
+    )  # + 0.0 makes -0 plain 0
+
+
+def setting(value: Any) -> str:
+    """A setting of any kind as text that is the same every time: no addresses, no order of hashing."""
+    match value:
+        case None | bool() | int() | str():
+            return str(value)
+        case float() | np.generic():
+            return f"{value:g}" if isinstance(value, float | np.floating) else str(value)
+        case np.ndarray():
+            return setting(value.tolist())
+        case Mapping():
+            return ", ".join(f"{key}={setting(entry)}" for key, entry in value.items()) or "none"
+        case Set():
+            return ", ".join(sorted(setting(entry) for entry in value)) or "none"
+        case Sequence():
+            return ", ".join(setting(entry) for entry in value) or "none"
+    return getattr(value, "__name__", type(value).__name__)

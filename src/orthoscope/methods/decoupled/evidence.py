@@ -1,0 +1,126 @@
+"""Weights found, not asked for: how large noise, displacements of corners and of the lens are, from the data
+themselves.
+
+The marginal likelihood of Gaussian priors is greatest where, for each group of unknowns with variance v,
+
+    v = (sum of their squares) / gamma,      gamma = how many of them the data determined,
+    sigma^2 = (sum of squared residuals) / (measurements - poses - camera - all gammas)
+
+(D. MacKay, Bayesian interpolation, 1992). Groups: the surface in the target's plane and out of it; single
+corners along each axis; the lens's displacement. Iterated with the estimate; a variance that the data do
+not ask for runs to its floor, and the group to zero.
+
+The errors of one view's corners are not independent (blur, a rolling shutter, a board that bends as it is
+held): they have a smooth part, and smooth unknowns, the surface and the displacement, would take its chance
+pattern for their own. `likeness` is how much larger smooth patterns over a view are in the residuals than
+independent errors would make them; for smooth unknowns noise counts that much more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orthoscope.fitting.reprojection import POSE
+from orthoscope.methods.decoupled.normal_equations import SPACE, spline_unknowns
+from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known, Precisions
+from orthoscope.models.target_shape import polynomials
+
+__all__ = ["Evidence", "first_guess"]
+
+# of the target's size, the standard deviation of a printed corner to start from; its image, a pixel's tenth,
+# for a lens
+GUESS = 1e-3
+LEAST, MOST = 1e-6, 0.03  # of the target's size: the range of a standard deviation
+LEAST_BEND, MOST_BEND = 1e-8, 0.1  # of the unit of the distorted plane
+SETTLED = 0.01  # share by which noise and parameters may still change
+SMOOTH = (2, 3, 4)  # orders of the patterns: a pose takes those below, and waves are single corners' matter
+PLANE, HEIGHT = slice(None, 2), slice(2, None)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Variances: noise, px^2 of a coordinate; surface (2,) in the plane and across, singles (3,), metres^2;
+    bend, of the lens's plane.
+
+    size: of the target, metres. likeness: of errors within a view, 1 or more. parameters: how many the data
+    determined, poses left out.
+    """
+
+    noise: float
+    surface: tuple[float, float]
+    singles: tuple[float, float, float]
+    bend: float
+    size: float
+    likeness: float = 1.0
+    parameters: float = float("nan")
+
+    def precisions(self, coefficients: int) -> Precisions:
+        """What a problem with so many coefficients of the surface is to know."""
+        plane, height = self.surface
+        smooth = self.likeness * self.noise
+        surface = np.broadcast_to(smooth / np.array([plane, plane, height]), (coefficients, SPACE))
+        return Precisions(surface, self.noise / np.array(self.singles), smooth / self.bend)
+
+    def renewed(self, problem: Joint, unknowns: DecoupledEstimate, cost: float, known: Known) -> Evidence:
+        """The variances that an estimate, its cost and what the data determined of it speak for."""
+        observations = problem.measurements.observations
+        bend_cost, surface_cost, single_cost = problem.penalties(unknowns)
+        determined = len(problem.free) + known.spline + float(known.surface.sum() + known.singles.sum())
+        freedom = 2 * observations.corners - POSE * len(observations.order) - determined
+        noise = (cost - bend_cost - surface_cost - single_cost) / max(freedom, 1.0)
+        low, high = (LEAST * self.size) ** 2, (MOST * self.size) ** 2
+        surface = [
+            _variance(unknowns.surface[:, part], known.surface[:, part], low, high)
+            for part in (PLANE, HEIGHT)
+        ]
+        singles = [
+            _variance(unknowns.singles[:, axis], known.singles[:, axis], low, high) for axis in range(SPACE)
+        ]
+        bend = self.bend
+        if spline_unknowns(unknowns.camera):
+            squares = bend_cost / problem.precisions.spline
+            bend = float(np.clip(squares / max(known.spline, 1e-9), LEAST_BEND**2, MOST_BEND**2))
+        likeness = _likeness(problem, unknowns, noise)
+        return replace(
+            self,
+            likeness=likeness,
+            noise=noise,
+            surface=(surface[0], surface[1]),
+            singles=(singles[0], singles[1], singles[2]),
+            bend=bend,
+            parameters=determined,
+        )
+
+    def agrees_with(self, other: Evidence) -> bool:
+        """Whether noise and the number of determined parameters are as good as the same, so that the camera
+        no longer moves.
+        """
+        return bool(
+            abs(self.noise / other.noise - 1.0) < SETTLED
+            and abs(self.parameters / other.parameters - 1.0) < SETTLED
+        )
+
+
+def first_guess(noise: float, size: float, focal: float) -> Evidence:
+    """Where to start from.  noise: px^2 of a coordinate.  size: of the target, metres.  focal: pixels."""
+    corner = (GUESS * size) ** 2
+    return Evidence(noise, (corner, corner), (corner, corner, corner), (0.1 / focal) ** 2, size)
+
+
+def _likeness(problem: Joint, unknowns: DecoupledEstimate, noise: float) -> float:
+    """Mean square of smooth patterns in the residuals of a view, over what independent errors of this
+    variance would give.
+    """
+    seen = problem.measurements.observations.present
+    patterns = polynomials(problem.points, seen.max(0) > 0, orders=SMOOTH)
+    found = np.einsum("pr,mpa->mra", patterns, problem.residuals(unknowns))
+    expected = noise * (seen @ patterns**2)
+    return max(1.0, float((found**2).sum() / (2.0 * expected.sum())))
+
+
+def _variance(values: np.ndarray, known: np.ndarray, low: float, high: float) -> float:
+    return (
+        float(np.clip((values**2).sum() / max(float(known.sum()), 1e-9), low, high)) if values.size else low
+    )

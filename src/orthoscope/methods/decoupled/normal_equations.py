@@ -1,0 +1,229 @@
+"""What the measurements say about camera, spline, poses and single corners: the sums of their linearised
+problem.
+
+Unknowns in four groups: z of the camera (k parameters and, for a free lens, the 2 g coefficients of its
+displacement, all of x first), six of each view, three of each of the target's corners. With rows u and v of
+each corner in each view and their derivatives, every sum that normal equations want is formed once, whichever
+group is eliminated later:
+
+    zz zv vv   camera and poses        zc cc vc   the same with corners        z v c   each with the residual
+
+A corner moves its image as its view's translation does, turned into the target's frame: d/dp = R^T d/dt. A
+spline's coefficient moves u by f_x B and v by f_y B, so its sums are products with the one matrix B of spline
+values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.fitting.observations import Chunk, Observations, Poses
+from orthoscope.fitting.reprojection import POSE, Estimate, Places, Reprojection
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.solve.losses import Linear, Loss
+
+__all__ = ["MeasurementSums", "Measurements", "by_corner", "spline_unknowns", "spline_values"]
+
+SPACE = 3
+
+
+class MeasurementSums(NamedTuple):
+    """The module's sums: cost, zz (n,n), z (n,), zv (m,n,6), vv (m,6,6), v (m,6), zc (p,n,3), cc (p,3,3), c
+    (p,3), vc (m,p,6,3).
+
+    residuals: (m,p,2) predicted minus detected, pixels, not weighted; 0 where a corner was not seen.
+    """
+
+    cost: float
+    zz: ndarray
+    z: ndarray
+    zv: ndarray
+    vv: ndarray
+    v: ndarray
+    zc: ndarray
+    cc: ndarray
+    c: ndarray
+    vc: ndarray
+    residuals: ndarray
+
+
+def spline_unknowns(camera: Camera) -> int:
+    """How many coefficients the displacement of a camera's lens has, in x and y together; 0 for a formula."""
+    return camera.lens.over.coefficients.size if isinstance(camera.lens, FreeLens) else 0
+
+
+class Measurements:
+    """The corners of all views, and what they say at an estimate.
+
+    observations: by corner. camera: of the kind to come. free: its parameters that move. corners_move:
+    whether sums with corners are wanted; they are zero otherwise.
+    """
+
+    def __init__(
+        self, observations: Observations, camera: Camera, free: Sequence[str], *, corners_move: bool = True
+    ) -> None:
+        self.observations, self.corners_move = observations, corners_move
+        corners = observations.ids.shape[1]
+        self._reprojection = Reprojection(observations, np.zeros((corners, SPACE)), camera, free)
+        self._chunks = observations.chunks()
+        self._k = len(free)
+        self._last: tuple[tuple[Camera, Poses, Loss], ndarray, MeasurementSums] | None = None
+
+    def sums(
+        self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"], loss: Loss
+    ) -> MeasurementSums:
+        """The sums at an estimate; points: of the target's corners, metres, target frame.
+
+        Asked for the same again, as when only priors have changed, it gives the same again without work.
+        """
+        asked = (camera, poses, loss)
+        if not (
+            self._last
+            and all(one is other for one, other in zip(asked, self._last[0], strict=True))
+            and (points == self._last[1]).all()
+        ):
+            self._last = (asked, points, self._sums(camera, poses, points, loss))
+        return self._last[2]
+
+    def _sums(
+        self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"], loss: Loss
+    ) -> MeasurementSums:
+        m, p = self.observations.ids.shape
+        k, g = self._k, spline_unknowns(camera) // 2
+        n = k + 2 * g
+        sums = _zeros(n, m, p)
+        cost, places = 0.0, Places(*points.T)
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            for chunk in self._chunks:
+                stacked = self._reprojection.stack(Estimate(camera, poses), chunk, places)
+                sums.residuals[chunk.rows] = _residuals(stacked)
+                part, root = self._weigh(stacked, chunk, loss)
+                cost += part
+                _add_camera_and_poses(sums, stacked, chunk.rows, k)
+                turned = (
+                    by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows])
+                    if self.corners_move
+                    else None
+                )
+                if turned is not None:
+                    _add_corners(sums, stacked, turned, chunk.rows, k)
+                if isinstance(camera.lens, FreeLens):
+                    design = spline_values(camera.lens, poses.only(chunk.rows), points) * root[:, :, None]
+                    frame = camera.lens_frame or camera.intrinsics
+                    _add_spline(sums, design, stacked, chunk.rows, k, frame)
+                    if turned is not None:
+                        _add_spline_and_corners(sums, design, turned, k, frame)
+        return sums._replace(cost=cost)
+
+    def residuals(
+        self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"]
+    ) -> Float[ndarray, "m p 2"]:
+        """Projected minus detected, pixels; 0 where a corner was not seen."""
+        return self.sums(camera, poses, points, self._last[0][2] if self._last else Linear()).residuals
+
+    def _weigh(self, stacked: ndarray, chunk: Chunk, loss: Loss) -> tuple[float, ndarray]:
+        """The cost of a chunk, and the root of each corner's weight (views, n), by which its rows are
+        multiplied here.
+        """
+        views, n = chunk.u.shape
+        e = stacked[:, -1]
+        squared = e[:, :n] ** 2 + e[:, n:] ** 2
+        root = np.ones((views, n))
+        if (weight := loss.weight(squared)) is not None and (weight < 1.0).any():
+            root = np.sqrt(weight)
+            stacked *= np.concatenate([root, root], axis=1)[:, None]
+        return float(loss.cost(squared).sum()), root if chunk.present is None else root * chunk.present
+
+
+def _zeros(n: int, m: int, p: int) -> MeasurementSums:
+    shapes = [
+        (n, n),
+        (n,),
+        (m, n, POSE),
+        (m, POSE, POSE),
+        (m, POSE),
+        (p, n, SPACE),
+        (p, SPACE, SPACE),
+        (p, SPACE),
+        (m, p, POSE, SPACE),
+        (m, p, 2),
+    ]
+    return MeasurementSums(0.0, *(np.zeros(shape) for shape in shapes))
+
+
+def _residuals(stacked: Float[ndarray, "v columns n2"]) -> Float[ndarray, "v n 2"]:
+    return stacked[:, -1].reshape(len(stacked), 2, -1).transpose(0, 2, 1)
+
+
+def by_corner(
+    by_translation: Float[ndarray, "v 3 n2"], rotation: Float[ndarray, "v 3 3"]
+) -> Float[ndarray, "v n 3 2"]:
+    """d(u, v) by the place of each corner in the target's frame."""
+    views, _, rows = by_translation.shape
+    turned = (rotation.transpose(0, 2, 1) @ by_translation).reshape(views, SPACE, 2, rows // 2)
+    return np.ascontiguousarray(turned.transpose(0, 3, 1, 2))
+
+
+def _add_camera_and_poses(sums: MeasurementSums, stacked: ndarray, rows: slice, k: int) -> None:
+    gram = stacked @ stacked.transpose(0, 2, 1)
+    sums.zz[:k, :k] += gram[:, :k, :k].sum(0)
+    sums.z[:k] += gram[:, :k, -1].sum(0)
+    sums.zv[rows, :k], sums.vv[rows], sums.v[rows] = gram[:, :k, k:-1], gram[:, k:-1, k:-1], gram[:, k:-1, -1]
+
+
+def _add_corners(sums: MeasurementSums, stacked: ndarray, turned: ndarray, rows: slice, k: int) -> None:
+    views, columns, _ = stacked.shape
+    of_corner = stacked.reshape(views, columns, 2, -1).transpose(0, 3, 2, 1)  # (views, n, 2, columns)
+    products = turned @ of_corner
+    sums.zc[:, :k] += products[..., :k].sum(0).transpose(0, 2, 1)
+    sums.cc[:] += (turned @ turned.transpose(0, 1, 3, 2)).sum(0)
+    sums.c[:] += products[..., -1].sum(0)
+    sums.vc[rows] = products[..., k:-1].transpose(0, 1, 3, 2)
+
+
+def spline_values(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "v p g"]:
+    """The value of every spline at every corner's place in the base's distorted plane."""
+    in_camera = np.einsum("vab,pb->avp", poses.rotation, points) + poses.translation.T[:, :, None]
+    return lens.over.lattice.design(*lens.base.warp(*lens.chart.flatten(*in_camera)))
+
+
+def _add_spline(
+    sums: MeasurementSums, design: ndarray, stacked: ndarray, rows: slice, k: int, frame: Intrinsics
+) -> None:
+    """Sums of the displacement's coefficients with themselves, camera and poses: x moves u by fx B; y moves v
+    by fy B and u by skew B.
+    """
+    corners, g = design.shape[1:]
+    x, y = slice(k, k + g), slice(k + g, k + 2 * g)
+    flat = design.reshape(-1, g)
+    square = flat.T @ flat
+    sums.zz[x, x] += frame.fx**2 * square
+    sums.zz[x, y] += frame.fx * frame.skew * square
+    sums.zz[y, x] += frame.fx * frame.skew * square
+    sums.zz[y, y] += (frame.fy**2 + frame.skew**2) * square
+    across = design.transpose(0, 2, 1)
+    of_u, of_v = (
+        across @ stacked[:, :, half].transpose(0, 2, 1)
+        for half in (slice(None, corners), slice(corners, None))
+    )
+    for columns, products in ((x, frame.fx * of_u), (y, frame.fy * of_v + frame.skew * of_u)):
+        with_camera = products[:, :, :k].sum(0)
+        sums.zz[columns, :k] += with_camera
+        sums.zz[:k, columns] += with_camera.T
+        sums.z[columns] += products[:, :, -1].sum(0)
+        sums.zv[rows, columns] = products[:, :, k:-1]
+
+
+def _add_spline_and_corners(
+    sums: MeasurementSums, design: ndarray, turned: ndarray, k: int, frame: Intrinsics
+) -> None:
+    g = design.shape[2]
+    down = design.transpose(1, 2, 0)
+    by_u, by_v = (down @ turned[..., half].transpose(1, 0, 2) for half in (0, 1))
+    sums.zc[:, k : k + g] += frame.fx * by_u
+    sums.zc[:, k + g : k + 2 * g] += frame.fy * by_v + frame.skew * by_u

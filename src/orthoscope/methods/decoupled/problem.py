@@ -1,0 +1,246 @@
+"""Camera, poses, the target's shape and the lens's displacement in one least-squares problem with priors.
+
+Minimised over the camera (K, base lens, displacement s), the poses and the corners p_i + d_i with d_i =
+surface(p_i) + single_i:
+
+    sum over views and corners of rho(|e|^2)
+    + sigma^2 ( s'Es / var_s  +  sum surface^2 / var  +  sum single^2 / var )
+
+The priors settle what nothing else does: they have no similarity of the target (poses do that for nothing)
+and no displacement of the lens that K and the base can do. Either the views (6 by 6 each) or the single
+corners (3 by 3 each) are eliminated, whichever leaves the smaller system; solve/ does not know which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.fitting.observations import Poses
+from orthoscope.fitting.reprojection import POSE, with_parameters
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.pose import rotation_from_vector
+from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements, MeasurementSums
+from orthoscope.models.camera import Camera
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.spline import Displacement
+from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.losses import Loss
+
+__all__ = ["DecoupledEstimate", "Joint", "Known", "Precisions"]
+
+ROUNDING = 1e-13  # of a scaled system: what is added to its diagonal before it is inverted
+
+
+class DecoupledEstimate(NamedTuple):
+    """camera; poses of all views; surface (r,3) coefficients and singles (p,3) displacements of corners,
+    metres.
+    """
+
+    camera: Camera
+    poses: Poses
+    surface: ndarray
+    singles: ndarray
+
+
+class Precisions(NamedTuple):
+    """sigma^2 over the variance of each prior: surface (r,3) and singles (3,), px^2/m^2; spline, a number
+    times its energy.
+    """
+
+    surface: ndarray
+    singles: ndarray
+    spline: float
+
+
+class Known(NamedTuple):
+    """Posterior covariance over sigma^2: of the camera's k parameters; the share of each prior's unknowns
+    that the data determined.
+
+    spline: a number out of its unknowns.  surface (r,3), singles (p,3): each between 0 and 1.
+    """
+
+    camera: ndarray
+    spline: float
+    surface: ndarray
+    singles: ndarray
+
+
+class Joint:
+    """The problem for given measurements.
+
+    points: (p,3) nominal corners. surface: (p,r) what its coefficients multiply. energy: (g,g) of the
+    displacement, or none. single: whether corners have displacements of their own.
+    """
+
+    def __init__(
+        self,
+        measurements: Measurements,
+        points: Float[ndarray, "p 3"],
+        free: Sequence[str],
+        *,
+        surface: Float[ndarray, "p r"],
+        energy: Float[ndarray, "g g"],
+        single: bool,
+        precisions: Precisions,
+    ) -> None:
+        self.measurements, self.points, self.free = measurements, points, tuple(free)
+        self.surface, self.energy, self.single, self.precisions = surface, energy, single, precisions
+        self._n = len(free) + 2 * len(energy) + SPACE * surface.shape[1]
+        views = len(measurements.observations.order)
+        self.by_corner = single and SPACE * len(points) >= POSE * views
+
+    def corners(self, unknowns: DecoupledEstimate) -> Float[ndarray, "p 3"]:
+        """Where the target's corners are."""
+        return self.points + self.surface @ unknowns.surface + unknowns.singles
+
+    def residuals(self, unknowns: DecoupledEstimate) -> Float[ndarray, "m p 2"]:
+        """Projected minus detected, pixels; 0 where a corner was not seen."""
+        return self.measurements.residuals(unknowns.camera, unknowns.poses, self.corners(unknowns))
+
+    def linearise(self, unknowns: DecoupledEstimate, loss: Loss) -> NormalEquations:
+        """The solver's sums."""
+        sums = self.measurements.sums(unknowns.camera, unknowns.poses, self.corners(unknowns), loss)
+        return self._arranged(self._with_priors(self._with_surface(sums), unknowns))
+
+    def move(
+        self, unknowns: DecoupledEstimate, shared: Float[ndarray, " n"], views: Float[ndarray, "b q"]
+    ) -> DecoupledEstimate:
+        """The estimate after a step; views: of the blocks that were eliminated, views or single corners."""
+        k, g = len(self.free), len(self.energy)
+        camera = with_parameters(unknowns.camera, self.free, shared[:k])
+        if isinstance(camera.lens, FreeLens):
+            moved = camera.lens.over.coefficients + shared[k : k + 2 * g].reshape(2, g).T
+            camera = replace(
+                camera, lens=replace(camera.lens, over=Displacement(camera.lens.over.lattice, moved))
+            )
+        surface = unknowns.surface + shared[k + 2 * g : self._n].reshape(-1, SPACE)
+        rest = shared[self._n :]
+        pose_steps, singles = (
+            (rest.reshape(-1, POSE), views) if self.by_corner else (views, rest.reshape(-1, SPACE))
+        )
+        rotation = rotation_from_vector(pose_steps[:, :3]) @ unknowns.poses.rotation
+        poses = Poses(rotation, unknowns.poses.translation + pose_steps[:, 3:])
+        return DecoupledEstimate(
+            camera, poses, surface, unknowns.singles + singles if self.single else unknowns.singles
+        )
+
+    def penalties(self, unknowns: DecoupledEstimate) -> tuple[float, float, float]:
+        """What spline, surface and singles add to the cost."""
+        over = (
+            unknowns.camera.lens.over.coefficients
+            if isinstance(unknowns.camera.lens, FreeLens)
+            else np.zeros((0, 2))
+        )
+        surface, singles, spline = self.precisions
+        return (
+            float(spline * (over * (self.energy @ over)).sum()),
+            float((surface * unknowns.surface**2).sum()),
+            float((singles * unknowns.singles**2).sum()),
+        )
+
+    def known(self, sums: NormalEquations) -> Known:
+        """What the data determined, from the sums where a solve ended."""
+        inverse = np.linalg.inv(sums.C)
+        Y = sums.B @ inverse
+        eliminated = sums.A - np.tensordot(Y, sums.B, axes=([0, 2], [0, 2]))
+        covariance = _inverse(eliminated)
+        k, g, n = len(self.free), len(self.energy), self._n
+        spread = np.diag(covariance)
+        in_spline = (
+            sum(np.vdot(self.energy, covariance[i : i + g, i : i + g]) for i in (k, k + g)) if g else 0.0
+        )
+        if not self.single:
+            singles = np.zeros((len(self.points), SPACE))
+        elif self.by_corner:
+            back = Y.transpose(0, 2, 1)
+            singles = np.diagonal(inverse, axis1=1, axis2=2) + ((back @ covariance) * back).sum(-1)
+        else:
+            singles = spread[n:].reshape(-1, SPACE)
+        return Known(
+            covariance[:k, :k],
+            2 * g - self.precisions.spline * float(in_spline),
+            np.clip(1.0 - self.precisions.surface * spread[k + 2 * g : n].reshape(-1, SPACE), 0.0, 1.0),
+            np.clip(1.0 - self.precisions.singles * singles, 0.0, 1.0) if self.single else singles,
+        )
+
+    def _with_surface(self, sums: MeasurementSums) -> MeasurementSums:
+        """The camera's group grown by the surface's coefficients, which move every corner at once."""
+        S, (p, r) = self.surface, self.surface.shape
+        if r == 0:
+            return sums
+        n, m = len(sums.z), len(sums.vv)
+        z_surface = np.tensordot(sums.zc, S, axes=(0, 0)).transpose(0, 2, 1).reshape(n, r * SPACE)
+        c_surface = (sums.cc[:, None] * S[:, :, None, None]).reshape(
+            p, r * SPACE, SPACE
+        )  # (p, (r, axis), axis)
+        surface_surface = (
+            np.tensordot(S, c_surface, axes=(0, 0)).transpose(1, 0, 2).reshape(r * SPACE, r * SPACE)
+        )
+        v_surface = np.tensordot(sums.vc, S, axes=(1, 0)).transpose(0, 3, 2, 1).reshape(m, r * SPACE, POSE)
+        return sums._replace(
+            zz=np.block([[sums.zz, z_surface], [z_surface.T, surface_surface]]),
+            z=np.concatenate([sums.z, (S.T @ sums.c).ravel()]),
+            zv=np.concatenate([sums.zv, v_surface], axis=1),
+            zc=np.concatenate([sums.zc, c_surface], axis=1),
+        )
+
+    def _with_priors(self, sums: MeasurementSums, unknowns: DecoupledEstimate) -> MeasurementSums:
+        k, g = len(self.free), len(self.energy)
+        surface, singles, spline = self.precisions
+        zz, z = sums.zz.copy(), sums.z.copy()  # the measurements keep theirs
+        if isinstance(unknowns.camera.lens, FreeLens):
+            pull = spline * self.energy @ unknowns.camera.lens.over.coefficients
+            for i in (0, 1):
+                part = slice(k + i * g, k + (i + 1) * g)
+                zz[part, part] += spline * self.energy
+                z[part] += pull[:, i]
+        diagonal = np.arange(k + 2 * g, self._n)
+        zz[diagonal, diagonal] += surface.ravel()
+        z[diagonal] += (surface * unknowns.surface).ravel()
+        return sums._replace(
+            zz=zz,
+            z=z,
+            cost=sums.cost + sum(self.penalties(unknowns)),
+            cc=sums.cc + np.diag(singles),
+            c=sums.c + singles * unknowns.singles,
+        )
+
+    def _arranged(self, sums: MeasurementSums) -> NormalEquations:
+        """One group eliminated, the others shared."""
+        if not self.single:
+            return NormalEquations(sums.cost, sums.zz, sums.z, sums.zv, sums.vv, sums.v)
+        if self.by_corner:
+            crossed = np.concatenate(
+                [sums.zc, sums.vc.transpose(1, 0, 2, 3).reshape(len(sums.cc), -1, SPACE)], axis=1
+            )
+            A, a = _bordered(sums.zz, sums.z, sums.zv, sums.vv, sums.v)
+            return NormalEquations(sums.cost, A, a, crossed, sums.cc, sums.c)
+        crossed = np.concatenate(
+            [sums.zv, sums.vc.transpose(0, 1, 3, 2).reshape(len(sums.vv), -1, POSE)], axis=1
+        )
+        A, a = _bordered(sums.zz, sums.z, sums.zc, sums.cc, sums.c)
+        return NormalEquations(sums.cost, A, a, crossed, sums.vv, sums.v)
+
+
+def _bordered(zz: ndarray, z: ndarray, zb: ndarray, bb: ndarray, b: ndarray) -> tuple[ndarray, ndarray]:
+    """The system of z and of blocks that know each other only through it."""
+    n, (blocks, q) = len(z), b.shape
+    A = np.zeros((n + blocks * q, n + blocks * q))
+    A[:n, :n] = zz
+    A[:n, n:] = zb.transpose(1, 0, 2).reshape(n, blocks * q)
+    A[n:, :n] = A[:n, n:].T
+    each = np.arange(blocks)
+    A[n:, n:].reshape(blocks, q, blocks, q)[each, :, each] = bb
+    return A, np.concatenate([z, b.ravel()])
+
+
+def _inverse(matrix: Float[ndarray, "n n"]) -> Float[ndarray, "n n"]:
+    """Of a symmetric positive system, whatever its units."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled = matrix * scale * scale[:, None]
+    scaled[np.diag_indices_from(scaled)] += ROUNDING
+    return np.linalg.inv(scaled) * scale * scale[:, None]

@@ -1,0 +1,175 @@
+"""Step 1 of `decoupled`: poses, the target's shape and the lens together, from a calibration with a flat
+target.
+
+Each round minimises the joint problem (problem.py) for the weights at hand and finds the weights anew
+(evidence.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.observations import Observations
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.methods.decoupled.evidence import Evidence, first_guess
+from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
+from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint
+from orthoscope.models.camera import Camera
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.lenses import FREE
+from orthoscope.models.spline import Displacement, Lattice
+from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
+from orthoscope.solve.least_squares import Options, solve
+from orthoscope.solve.losses import Huber
+
+__all__ = ["FORMULA", "StepOneFit", "fit_step_one"]
+
+# beside FREE: the lens of step 1: a displacement over a formula, or the formula alone
+FORMULA = "formula"
+
+ROUNDS = 6
+COARSE, FINE = 1e-3, 1e-9  # tolerances of a round and of the last
+# standard deviations of a coordinate: independent errors reach so far once in 3000, and count less
+# beyond
+FAR = 4.0
+LOSS_KEEPS = (
+    0.05  # share by which noise may change before the loss does: its sums then need not be formed again
+)
+CELLS = 8  # of the displacement's lattice along the image's longer side
+MARGIN = 0.05  # of the image's sides, by which the lattice is larger
+# of the image's half diagonal: the range of the displacement's prior; from half to twice this the
+# held-out error is the same
+REACH = 0.67
+
+
+@dataclass(frozen=True, eq=False)
+class StepOneFit:
+    """What came out: the kind of the target's shape, the problem with its last weights, the estimate and what
+    it speaks for.
+
+    covariance: (k,k) of the free parameters.  steps, status: of the solver.
+    """
+
+    target: str
+    problem: Joint
+    estimate: DecoupledEstimate
+    evidence: Evidence
+    covariance: Float[ndarray, "k k"]
+    steps: int
+    status: str
+
+    @property
+    def loss(self) -> Huber:
+        """How errors count, for noise as large as was found."""
+        return _loss(self.evidence.noise)
+
+    def with_formula(self, camera: Camera, free: Sequence[str]) -> tuple[Float[ndarray, "k k"], float]:
+        """For another camera in the place of the estimate's: covariance of its free parameters, and how many
+        the data determine in all.
+        """
+        problem = self.problem
+        measurements = Measurements(problem.measurements.observations, camera, free)
+        other = Joint(
+            measurements, problem.points, free,
+            surface=problem.surface,
+            energy=np.zeros((0, 0)),
+            single=problem.single,
+            precisions=problem.precisions,
+        )  # fmt: skip
+        known = other.known(other.linearise(self.estimate._replace(camera=camera), self.loss))
+        return self.evidence.noise * known.camera, len(free) + float(
+            known.surface.sum() + known.singles.sum()
+        )
+
+    @property
+    def shape(self) -> TargetShape:
+        """Of the target, without a similarity."""
+        points = self.problem.points
+        if self.target == "flat":
+            return TargetShape.flat(len(points))
+        seen = self.problem.measurements.observations.present.max(0) > 0
+        return TargetShape(
+            self.target, without_similarity(points, self.problem.corners(self.estimate) - points, seen)
+        )
+
+
+def fit_step_one(flat: Calibration, *, target: str, through: str) -> StepOneFit:
+    """Camera, poses and shape together.
+
+    flat: a calibration of a flat target to start from; its parameters are freed. target: `flat`, `smooth` or
+    `free`. through: FREE or FORMULA, the lens.
+    """
+    detections, free = flat.detections, flat.uncertainty.names
+    camera = _with_displacement(flat.camera) if through == FREE else flat.camera
+    observations = Observations.by_corner(detections)
+    points, seen = detections.target.points, observations.present.max(0) > 0
+    basis = polynomials(points, seen) if target != "flat" else np.zeros((len(points), 0))
+    energy = _energy(camera)
+    measurements = Measurements(observations, camera, free, corners_move=target != "flat")
+    estimate = DecoupledEstimate(
+        camera,
+        observations.poses_of(flat.camera_from_target),
+        np.zeros((basis.shape[1], SPACE)),
+        np.zeros((len(points), SPACE)),
+    )
+    evidence = first_guess(
+        0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), camera.intrinsics.fx
+    )
+    noise, loss = evidence.noise, _loss(evidence.noise)
+    steps, settled = 0, False
+    for round_ in range(ROUNDS):
+        last = settled or round_ == ROUNDS - 1
+        precisions = evidence.precisions(basis.shape[1])
+        problem = Joint(
+            measurements,
+            points,
+            free,
+            surface=basis,
+            energy=energy,
+            single=target == "free",
+            precisions=precisions,
+        )
+        options = Options(tolerance=FINE if last else COARSE, max_steps=50)
+        if abs(evidence.noise / noise - 1.0) > LOSS_KEEPS:
+            noise, loss = evidence.noise, _loss(evidence.noise)
+        solution = solve(problem, estimate, loss=loss, options=options)
+        estimate, steps = solution.unknowns, steps + solution.steps
+        known = problem.known(solution.sums)
+        renewed = evidence.renewed(problem, estimate, solution.cost, known)
+        if last:
+            return StepOneFit(
+                target, problem, estimate, renewed, renewed.noise * known.camera, steps, solution.status.value
+            )
+        settled = renewed.agrees_with(evidence)
+        evidence = renewed
+    raise AssertionError("the last round returns")
+
+
+def _loss(noise: float) -> Huber:
+    """noise: px^2 of a coordinate."""
+    return Huber(FAR * float(np.sqrt(noise)))
+
+
+def _with_displacement(camera: Camera) -> Camera:
+    """The camera with a displacement of nothing over its image, a margin included."""
+    frame = camera.lens_frame or camera.intrinsics
+    width, height = camera.image_size
+    low, high = frame.to_plane(
+        np.array([[-MARGIN * width, -MARGIN * height], [(1 + MARGIN) * width, (1 + MARGIN) * height]])
+    )
+    longer = max(width, height)
+    cells = (max(1, round(CELLS * width / longer)), max(1, round(CELLS * height / longer)))
+    lattice = Lattice.over(low, high, cells)
+    return replace(camera, lens=FreeLens(camera.lens, Displacement(lattice, np.zeros((lattice.splines, 2)))))
+
+
+def _energy(camera: Camera) -> Float[ndarray, "g g"]:
+    if not isinstance(camera.lens, FreeLens):
+        return np.zeros((0, 0))
+    lattice = camera.lens.over.lattice
+    sides = lattice.step * (np.array(lattice.shape) - 3)
+    return lattice.energy(REACH * 0.5 * float(np.hypot(*sides)))

@@ -1,0 +1,207 @@
+"""The lens that makes rows and columns straight, found without being told anything.
+
+Straightness alone has poor starts: a centre that moves before the coefficients are about right runs away, as
+Basu and Licardie saw with few points (the paper, section 4). So in this order: every start that the formula
+names, and for a lens of the angle every field of view; from the few that bend the lines least, the
+coefficients alone with a loss that forgives; then with the centre. Two things the lines may not tell. A
+centre: it is then held at the image's, and that is said. The scale of a lens of the angle, which its
+coefficients make up for where the view is not wide: it then stays at the field of view that was tried. The
+lens's own camera has the lens frame for its K: cx and cy are the distortion centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.fitting.initial_camera import FIELDS
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.reprojection import with_parameters
+from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.methods.mldc.lens_about_centre import CENTRE, straightened_parameters
+from orthoscope.methods.mldc.line_residuals import LinesOfSight, Straightness
+from orthoscope.methods.mldc.lines_in_views import SeenLines
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.charts import EQUIDISTANT
+from orthoscope.models.lens import Formula
+from orthoscope.solve.least_squares import Options, Solution, shared_covariance, solve
+from orthoscope.solve.losses import Cauchy, Linear, Loss
+from orthoscope.targets.detections import Target
+
+__all__ = ["StraightLens", "fit_straight_lens"]
+
+TRIED = 3  # starts that are followed to their end
+FORGIVING = 0.002  # of the longer side: errors beyond this hardly count in the first fit
+NOISE = 0.1  # px: corners are never taken to be better than this when asking whether they tell the centre
+VAGUE = 0.1  # of the diagonal: a centre less certain than this is not known
+EQUAL = 0.01  # costs that differ by less than this share are as good as one another
+PROBED = 50  # steps that the scale of a lens of the angle is given to show that it matters
+
+SCALE = "frame_scale"
+OWN_NAMES = {
+    "centre_x": "cx",
+    "centre_y": "cy",
+    SCALE: "fx=fy",
+}  # parameters of the lens frame, as those of the lens's own camera
+
+
+class StraightLens(NamedTuple):
+    """What straightness tells: the lens's own camera, the parameters that were free (as lens_about_centre.py
+    names them), their covariance.
+    """
+
+    camera: Camera
+    free: tuple[str, ...]
+    covariance: Float[ndarray, "k k"]
+    assumptions: tuple[str, ...]
+    solution: Solution[LinesOfSight]
+
+    def moved(self, step: Float[ndarray, " k"]) -> Camera:
+        """The lens's own camera after a step of the free parameters."""
+        return with_parameters(self.camera, tuple(OWN_NAMES.get(name, name) for name in self.free), step)
+
+
+def fit_straight_lens(
+    observations: Observations,
+    target: Target,
+    image_size: tuple[int, int],
+    lens: type[Formula],
+    coefficients: tuple[str, ...],
+    *,
+    loss: Loss,
+    options: Options,
+) -> StraightLens:
+    """The lens, about a centre of its own, that makes the lines straightest, by least squares in pixels of
+    the photograph.
+
+    Raises CalibrationError where the lines say too little for so many coefficients, or the lens cannot see
+    the corners.
+    """
+    lines = SeenLines.of(observations, target)
+
+    def problem(free: tuple[str, ...]) -> Straightness:
+        return Straightness(observations, lines, tuple(OWN_NAMES.get(name, name) for name in free))
+
+    free = straightened_parameters(lens, coefficients)
+    shape = tuple(name for name in free if name not in CENTRE)
+    starts = _likeliest(problem(free), image_size, lens)
+    straight = _result(
+        problem(free),
+        free,
+        _best([_followed(problem(free), problem(shape), start, loss, options) for start in starts]),
+    )
+    if not _tells_centre(straight, problem(free)):
+        free, told = (
+            shape,
+            ("the rows and columns do not tell the distortion centre; it is taken at the image's centre",),
+        )
+        found = [
+            solve(problem(free), problem(free).start(start), loss=loss, options=options) for start in starts
+        ]
+        straight = _result(problem(free), free, _best(found))._replace(assumptions=told)
+    return (
+        straight
+        if lens.chart is not EQUIDISTANT
+        else _with_scale(straight, problem((*free, SCALE)), loss, options)
+    )
+
+
+def _result(problem: Straightness, free: tuple[str, ...], found: Solution[LinesOfSight]) -> StraightLens:
+    return StraightLens(
+        found.unknowns.camera, free, shared_covariance(found.sums, problem.measurements), (), found
+    )
+
+
+def _with_scale(straight: StraightLens, problem: Straightness, loss: Loss, options: Options) -> StraightLens:
+    """The same with the frame's scale free too, where that makes the lines straighter."""
+    tried = solve(
+        problem,
+        straight.solution.unknowns,
+        loss=loss,
+        options=replace(options, max_steps=min(PROBED, options.max_steps)),
+    )
+    if not tried.cost < (1.0 - EQUAL) * straight.solution.cost:
+        return straight
+    found = solve(problem, tried.unknowns, loss=loss, options=options)
+    return _result(problem, (*straight.free, SCALE), found)._replace(assumptions=straight.assumptions)
+
+
+def _followed(
+    problem: Straightness, held: Straightness, start: Camera, loss: Loss, options: Options
+) -> Solution[LinesOfSight]:
+    """Coefficients first, with the centre held, then all."""
+    forgiving, rough = Cauchy(FORGIVING * max(start.image_size)), Options(max_steps=30, tolerance=1e-4)
+    return solve(
+        problem,
+        solve(held, held.start(start), loss=forgiving, options=rough).unknowns,
+        loss=loss,
+        options=options,
+    )
+
+
+def _best(solutions: list[Solution[LinesOfSight]]) -> Solution[LinesOfSight]:
+    """The likeliest start's, unless another's cost is really lower."""
+    least = min(solution.cost for solution in solutions)
+    return next(solution for solution in solutions if solution.cost <= (1.0 + EQUAL) * least)
+
+
+def _likeliest(problem: Straightness, image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
+    """The starts under which the lines are least bent as they are, the best first; raises CalibrationError as
+    `fit_straight_lens` does.
+    """
+    _check_enough(problem)
+    cameras = _starts(image_size, lens)
+    bent = np.array([problem.linearise(problem.start(camera), Linear()).cost for camera in cameras])
+    usable = np.flatnonzero(np.isfinite(bent))
+    if not len(usable):
+        raise CalibrationError(
+            f"the lens {lens.__name__} cannot see as far from its axis as these corners are. "
+            "Use a lens of the angle: --lens kannala_brandt."
+        )
+    return [cameras[i] for i in usable[np.argsort(bent[usable], kind="stable")][:TRIED]]
+
+
+def _starts(image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
+    """The lens's own cameras to try, about the image's centre; the unit of a lens of the plane is the image's
+    longer side.
+    """
+    width, height = image_size
+    diagonal = float(np.hypot(width, height))
+    scales = diagonal / FIELDS if lens.chart is EQUIDISTANT else (float(max(image_size)),)
+    return [
+        Camera(
+            image_size, Intrinsics(scale, scale, 0.5 * (width - 1), 0.5 * (height - 1)), lens(**coefficients)
+        )
+        for scale in map(float, scales)
+        for coefficients in lens.starts
+    ]
+
+
+def _check_enough(problem: Straightness) -> None:
+    """Raises CalibrationError where each line could be met by bending the lens."""
+    said, unknowns = problem.measurements - 2 * problem.lines, len(problem.free)
+    if said < unknowns:
+        raise CalibrationError(
+            f"{problem.lines} lines with {problem.measurements} corners say {said} things about straightness,"
+            f" fewer than the {unknowns} unknowns of the lens. Photograph a target with longer rows, take"
+            " more photographs, or free fewer coefficients, as in --lens pfet:a3."
+        )
+
+
+def _tells_centre(straight: StraightLens, problem: Straightness) -> bool:
+    """Whether the centre, if it was free, is in the image and certain enough."""
+    at = [straight.free.index(name) for name in CENTRE if name in straight.free]
+    (width, height), K = straight.camera.image_size, straight.camera.intrinsics
+    sigma = np.sqrt(
+        straight.solution.cost / max(problem.measurements - 2 * problem.lines - len(straight.free), 1)
+    )
+    deviation = np.sqrt(np.diag(straight.covariance)[at].max(initial=0.0)) * max(
+        1.0, NOISE / max(sigma, 1e-150)
+    )
+    return (
+        0 <= K.cx <= width - 1
+        and 0 <= K.cy <= height - 1
+        and bool(deviation < VAGUE * np.hypot(width, height))
+    )

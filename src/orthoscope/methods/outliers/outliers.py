@@ -1,0 +1,220 @@
+"""Corners and whole views that do not belong: found, named with the reason, and left out before a calibration
+starts.
+
+Three steps, each more exact than the one before and started by it.
+
+1. *Order*. In each view a robust polynomial over the target says where each corner should be, whatever the
+   lens (view_polynomial.py). A view whose typical corner misses that by more than DISORDER of a square is in
+   no order of the target and is set aside. Corners that miss by more than FAR_OFF take no part in the next
+   step's start; nothing is decided about them yet, since a strong lens is no polynomial.
+2. *Camera*. FCCM of the others with a Cauchy loss, then on with all corners, the loss's scale being OUTLYING
+   times the noise that the views tell. The scale is wide on purpose: a narrow one gives up the border of the
+   image where the lens formula fits badly, and the corners there would then look wrong.
+3. *Residuals* (residual_tests.py). What is off by far more than the noise, and for no reason that repeats, is
+   left out; 2 and 3 are done again until nothing changes.
+
+M. Fischler and R. Bolles' RANSAC (CACM 24, 1981) would do step 1 by chance; here the same photographs always
+give the same answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.observations import Observations, Poses
+from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.fitting.usable_views import with_usable_views
+from orthoscope.geometry.arrays import Bool, CalibrationError, Float, Int, ndarray
+from orthoscope.methods.fccm import fccm
+from orthoscope.methods.outliers.residual_tests import LEAST, OUTLYING, Believed, judged, noise_of, sizes_of
+from orthoscope.methods.outliers.view_polynomial import trends
+from orthoscope.solve.least_squares import Options, solve
+from orthoscope.solve.losses import Cauchy
+from orthoscope.targets.detections import Detections, Outlier, SetAside, View
+
+__all__ = ["without_outliers"]
+
+# of a square: a right board seen through a fisheye misses the polynomial by 0.3 at most, one in another order
+# by 0.5 to 20
+DISORDER = 0.4
+# times the typical view's share of a square: where all are as bad, none is in disorder, short of a whole
+# square
+UNLIKE = 3.0
+FAR_OFF = 4.0  # times the view's typical miss, and half a square
+DOUBTFUL = 0.25  # of a view's corners far off: where no camera fits, such views are given up first
+START_SCALE = 0.002  # of the image's longer side: where the loss of the start begins to matter
+ROUNDS = 4
+ROUGHLY = Options(max_steps=20, tolerance=1e-4)
+
+
+class _Order(NamedTuple):
+    """near (m,n): corners near where the others of their view put them. typical (m,): the view's median miss,
+    pixels. disorder (m,).
+    """
+
+    near: Bool[ndarray, "m n"]
+    typical: Float[ndarray, " m"]
+    disorder: Bool[ndarray, " m"]
+
+
+def without_outliers(detections: Detections, *, lens: str = "auto") -> Detections:
+    """The detections with corners that do not belong moved to `outliers` and views that do not to
+    `set_aside`, each with the reason.
+
+    lens: as in `fccm`. Raises CalibrationError where no view is left, or the corners fit no camera with this
+    lens.
+    """
+    used = with_usable_views(detections)
+    points = used.target.points
+    observations = Observations.of(used)
+    order = _order(observations, points)
+    aside = {
+        int(observations.order[row]): (
+            f"half of its corners are {order.typical[row]:.0f} px or more from where the others put them: "
+            "they are not in the target's order"
+        )
+        for row in np.flatnonzero(order.disorder)
+    }
+    believed, given_up = _started(used, observations, order, lens=lens)
+    believed, strange = _settled(believed, points)
+    return _parted(used, believed, sizes_of(believed, points), aside | given_up | strange)
+
+
+def _order(observations: Observations, points: Float[ndarray, "p 3"]) -> _Order:
+    """Step 1."""
+    present = observations.present
+    trend = trends(points[observations.ids, :2], observations.pixels(), present, order=3)
+    square = _squares(trend.values, present)
+    share = trend.typical / square
+    near = (present > 0) & (trend.misses <= np.maximum(FAR_OFF * trend.typical, 0.5 * square)[:, None])
+    return _Order(near, trend.typical, share > min(max(DISORDER, UNLIKE * float(np.median(share))), 1.0))
+
+
+def _squares(places: Float[ndarray, "m n 2"], present: Float[ndarray, "m n"]) -> Float[ndarray, " m"]:
+    """The side of the square that each corner of a view has to itself in the image, pixels."""
+    seen = present[..., None] > 0
+    spans = np.where(seen, places, -np.inf).max(1) - np.where(seen, places, np.inf).min(1)
+    return np.sqrt(spans.prod(1) / present.sum(1))
+
+
+def _started(
+    used: Detections, observations: Observations, order: _Order, *, lens: str
+) -> tuple[Believed, dict[int, str]]:
+    """Step 2, its start: camera and poses from the near corners; views that are given up, with the reason."""
+    rows = np.flatnonzero(~order.disorder)
+    if not len(rows):
+        raise CalibrationError(
+            f"the corners of no view are in the target's order ({used.views[0].image} and all the others;"
+            f" target {used.target.name!r}). Name the target that was photographed, or list its corners row"
+            " by row."
+        )
+    given_up: dict[int, str] = {}
+    try:
+        calibration = _from_near(used, observations, order.near, rows, lens=lens)
+    except CalibrationError:
+        far = 1.0 - order.near.sum(1) / observations.counts
+        doubtful = rows[far[rows] > DOUBTFUL]
+        if len(doubtful) in (0, len(rows)):
+            raise
+        given_up = {
+            int(observations.order[row]): (
+                f"{100 * far[row]:.0f} % of its corners are far from where the others put them, and with it"
+                " the photographs fit no camera"
+            )
+            for row in doubtful
+        }
+        rows = np.setdiff1d(rows, doubtful)
+        calibration = _from_near(used, observations, order.near, rows, lens=lens)
+    poses = dict(
+        zip(
+            (view.image for view in calibration.detections.views), calibration.camera_from_target, strict=True
+        )
+    )
+    reasons = dict(calibration.detections.set_aside)  # too few corners are near
+    images = [used.views[i].image for i in observations.order]
+    given_up |= {int(observations.order[row]): reasons[images[row]] for row in rows if images[row] in reasons}
+    posed = np.array([row for row in rows if images[row] in poses], dtype=np.int64)
+    stacked = Poses(
+        np.array([poses[images[row]].rotation for row in posed]),
+        np.array([poses[images[row]].translation for row in posed]),
+    )
+    some = observations.only(posed)
+    near = order.near[posed, : some.ids.shape[1]]
+    return (
+        Believed(some, near, Estimate(calibration.camera, stacked), calibration.uncertainty.names),
+        given_up,
+    )
+
+
+def _from_near(
+    used: Detections,
+    observations: Observations,
+    near: Bool[ndarray, "m n"],
+    rows: Int[ndarray, " v"],
+    *,
+    lens: str,
+) -> Calibration:
+    """FCCM of these rows' near corners, robustly."""
+    chosen = replace(used, views=_views(used, observations.order[rows], near[rows]), set_aside=())
+    return fccm(chosen, lens=lens, loss="cauchy", loss_scale=START_SCALE * max(used.image_size))
+
+
+def _settled(believed: Believed, points: Float[ndarray, "p 3"]) -> tuple[Believed, dict[int, str]]:
+    """Steps 2 and 3 until nothing changes: what is believed then, and the strange views with the reason."""
+    noise = noise_of(sizes_of(believed, points), believed.corners)
+    believed = _refined(believed._replace(corners=believed.present), points, noise=noise)
+    aside: dict[int, str] = {}
+    for _ in range(ROUNDS):
+        judgement = judged(believed, points)
+        corners = believed.present & ~judgement.off
+        if not judgement.strange and (corners == believed.corners).all():
+            break
+        aside |= {int(believed.observations.order[row]): reason for row, reason in judgement.strange.items()}
+        rows = np.setdiff1d(np.arange(len(corners)), list(judgement.strange))
+        believed = _refined(believed._replace(corners=corners).only(rows), points, noise=judgement.noise)
+    return believed, aside
+
+
+def _refined(believed: Believed, points: Float[ndarray, "p 3"], *, noise: float) -> Believed:
+    """Camera and poses again, from the corners that are believed."""
+    observations = replace(believed.observations, present=believed.corners.astype(float))
+    problem = Reprojection(observations, points, believed.estimate.camera, believed.free)
+    solution = solve(problem, believed.estimate, loss=Cauchy(max(OUTLYING * noise, LEAST)), options=ROUGHLY)
+    return believed._replace(estimate=solution.unknowns)
+
+
+def _views(used: Detections, indices: Int[ndarray, " v"], corners: Bool[ndarray, "v n"]) -> tuple[View, ...]:
+    """These views in the order of the photographs, each with its chosen corners."""
+    chosen = {}
+    for i, keep in zip(indices.tolist(), corners, strict=True):
+        view = used.views[i]
+        keep = keep[: len(view.ids)]
+        chosen[i] = view if keep.all() else View(view.image, view.ids[keep], view.pixels[keep])
+    return tuple(chosen[i] for i in sorted(chosen))
+
+
+def _parted(
+    used: Detections, believed: Believed, sizes: Float[ndarray, "m n"], aside: dict[int, str]
+) -> Detections:
+    """The detections without what was found, which is named."""
+    order, off = believed.observations.order, believed.present & ~believed.corners
+    outliers = []
+    for row in np.argsort(order):
+        view = used.views[order[row]]
+        for k in np.flatnonzero(off[row]):
+            reason = f"{sizes[row, k]:.1f} px from where the rest of the target puts it"
+            outliers.append(
+                Outlier(
+                    view.image, int(view.ids[k]), (float(view.pixels[k, 0]), float(view.pixels[k, 1])), reason
+                )
+            )
+    return replace(
+        used,
+        views=_views(used, order, believed.corners),
+        set_aside=(*used.set_aside, *(SetAside(used.views[i].image, aside[i]) for i in sorted(aside))),
+        outliers=(*used.outliers, *outliers),
+    )

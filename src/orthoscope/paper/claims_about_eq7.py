@@ -1,0 +1,60 @@
+"""Claims about eq. (7): that its search ends well, and that it ends at one camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from orthoscope.paper.claims import Claim, Verdict, share
+from orthoscope.paper.eq7_searches import Eq7Search
+from orthoscope.paper.wording import span
+
+__all__ = ["determined", "perfect"]
+
+PERFECT = 1e-10  # px^2: J of eq. (7)
+SAME = 0.01  # px: cameras that differ by less are one camera
+ACCURATE = 1.0  # NCE of rounding to whole pixels
+
+
+def perfect(where: str, members: Sequence[Eq7Search]) -> Claim:
+    """The search of eq. (7) always satisfies the template's restrictions perfectly."""
+    paper = "The search always converges to points which satisfy all template restrictions perfectly."
+    costs = np.array([member.J for member in members if member.literal])
+    if not len(costs):
+        return Claim(where, paper, Verdict.OPEN, "Eq. (7) was not searched.")
+    ended = int((costs < PERFECT).sum())
+    finding = (
+        f"J ends below {PERFECT:g} in {ended} of {len(costs)} searches; its largest end is {costs.max():.0e}."
+    )
+    return Claim(where, paper, share(ended, len(costs)), finding)
+
+
+def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
+    """Eq. (7) has one camera; members of one scene."""
+    paper = (
+        "The problem is over-constrained, so the points and the pin-hole are determined (eq. 8), and the"
+        " camera model is accurate."
+    )
+    ends = [
+        member.judgement
+        for member in members
+        if member.literal and member.J < PERFECT and not member.judgement.failure
+    ]
+    if len(ends) < 2:
+        return Claim(where, paper, Verdict.OPEN, "Fewer than two searches ended at J = 0.")
+    cameras = np.array([(end.fx, end.fy, end.cx, end.cy) for end in ends])
+    apart = float(np.ptp(cameras, axis=0).max())
+    of_each = ", ".join(
+        f"{name} {span(column, decimals=1)}"
+        for name, column in zip(("fx", "fy", "cx", "cy"), cameras.T, strict=True)
+    )
+    nce = np.array([end.test_nce for end in ends])
+    one = apart < SAME
+    verdict = Verdict.FAILS if not one else Verdict.HOLDS if (nce < ACCURATE).all() else Verdict.PARTLY
+    where_to = "one camera" if one else "different cameras"
+    finding = (
+        f"{len(ends)} searches of the same data, all with J < {PERFECT:g}, end at {where_to}: {of_each} px, "
+        f"up to {apart:.2g} px apart; test NCE {span(nce)}."
+    )
+    return Claim(where, paper, verdict, finding)

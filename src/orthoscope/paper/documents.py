@@ -1,0 +1,79 @@
+"""What a run leaves behind: the page and the CSV files, as texts by name.
+
+Nothing is written here, so that all of it is there before the first file is replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from orthoscope.paper.claims import headline
+from orthoscope.paper.curves import curves_of
+from orthoscope.paper.figures_with_claims import (
+    FigureWithClaims,
+    figures_with_claims,
+    on_photographs,
+    parameters_of,
+)
+from orthoscope.paper.files import curves_csv, members_csv, table_csv, trials_csv
+from orthoscope.paper.page import paper_page
+from orthoscope.paper.photographs import straightened
+from orthoscope.paper.section4 import SCENES, Results
+
+__all__ = ["Documents", "documents"]
+
+PAGE = "paper.html"
+
+
+class Documents(NamedTuple):
+    """The name of the page, its headline, and every text by its file's name."""
+
+    page: str
+    headline: str
+    texts: dict[str, str]
+
+
+def documents(results: Results, files: Mapping[str, Path] | None = None) -> Documents:
+    """The page and CSV files of a run; files: where the photographs are, for Fig. 7."""
+    shown = figures_with_claims(results)
+    real = on_photographs(results)
+    fig7 = straightened(results.detections, files or {}) if results.detections else None
+    texts = {PAGE: paper_page(results, straightened=fig7)}
+    texts |= {
+        f"{exhibit.kind.name}.csv": curves_csv(exhibit.curves, exhibit.kind.axis.column)
+        for exhibit in (*shown, *([real] if real else []))
+    }
+    texts |= {
+        f"lenses_{scene}.csv": curves_csv(
+            curves_of(results.outcomes, study="lenses", scene=scene), "noise_px"
+        )
+        for scene in SCENES
+    }
+    texts["eq7.csv"] = members_csv(results.members)
+    if real:
+        texts["table1.csv"] = _table1(results)
+    texts["trials.csv"] = trials_csv((*results.outcomes, *results.on_photographs))
+    return Documents(PAGE, _headline([*shown, *([real] if real else [])]), texts)
+
+
+def _headline(shown: list[FigureWithClaims]) -> str:
+    return headline([claim for exhibit in shown for claim in exhibit.claims])
+
+
+def _table1(results: Results) -> str:
+    """The paper's Table 1, a row for each method."""
+    parameters = ("fx", "fy", "cu", "cv", "gamma")
+    spread = [name for parameter in parameters for name in (parameter, f"{parameter}_std")]
+    rows = [
+        (
+            column.name,
+            *(value for parameter in parameters for value in column.values[parameter]),
+            column.training_nce,
+            column.test_nce,
+            column.failures,
+        )
+        for column in parameters_of(results)
+    ]
+    return table_csv(("method", *spread, "training_nce", "test_nce", "failures"), rows)

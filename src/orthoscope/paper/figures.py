@@ -1,0 +1,120 @@
+"""NCE of every entry, on training and on test data side by side.
+
+Data in, Figure out, in the report's style. The paper's three are thick, with their standard error as a band;
+peers with a fair chance are thin and dashed. Errors span from rounding noise to tens of pixels, so the axis
+is logarithmic, and linear below LINEAR.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+from orthoscope.geometry.arrays import ndarray
+from orthoscope.paper.curves import Curve, Curves
+from orthoscope.paper.entries import FCCM, MLDC, NMLDC
+from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, RED, SKY, note, styled
+
+__all__ = ["nce_figure"]
+
+LINEAR = 0.01  # NCE; no one needs to see less than 0.004 px
+PAPER_LOOK = {FCCM: (BLUE, "o"), NMLDC: (ORANGE, "s"), MLDC: (RED, "^")}
+FAIR_COLOURS = (SKY, "#009E73", "#CC79A7", INK)  # the rest of Okabe and Ito's
+WIDTH = 7.4  # inches
+
+
+@styled
+def nce_figure(curves: Curves, *, level: str, even: bool = False, height: float = 4.0) -> Figure:
+    """Training and test NCE against the level.
+
+    level: the axis's words, with unit.  even: levels at equal distances, whatever they are.  height: inches.
+    """
+    figure = Figure(figsize=(WIDTH, height))
+    left, right = figure.subplots(1, 2, sharey=True)
+    levels = np.unique(np.concatenate([curve.levels for curve in curves.values()])) if curves else np.empty(0)
+    fair = iter(FAIR_COLOURS * (1 + len(curves) // len(FAIR_COLOURS)))
+    looks = {name: PAPER_LOOK.get(name) or (next(fair), "") for name in curves}
+    for axes, title, of in ((left, "training data", "training_nce"), (right, "test data", "test_nce")):
+        axes.set_title(title, loc="left", fontweight="bold")
+        axes.set_xlabel(level)
+        axes.grid()
+        for name, curve in curves.items():
+            _draw(axes, curve, getattr(curve, of), levels, *looks[name], even=even, band=of == "test_nce")
+        if not any(np.isfinite(getattr(curve, of)).any() for curve in curves.values()):
+            note(axes, "no method gave a camera")
+        if even:
+            axes.set_xticks(range(len(levels)), [f"{level:g}" for level in levels])
+    _errors_axis(left, curves)
+    if curves:
+        figure.legend(
+            *left.get_legend_handles_labels(),
+            loc="outside upper left",
+            ncols=5,
+            handlelength=2.2,
+            columnspacing=1.4,
+        )
+    return figure
+
+
+def _draw(
+    axes: Axes,
+    curve: Curve,
+    nce: ndarray,
+    levels: ndarray,
+    colour: str,
+    marker: str,
+    *,
+    even: bool,
+    band: bool,
+) -> None:
+    x = np.searchsorted(levels, curve.levels) if even else curve.levels
+    thick = curve.name in PAPER_LOOK
+    if band and thick:
+        axes.fill_between(
+            x, nce - curve.test_error, nce + curve.test_error, color=colour, alpha=0.18, linewidth=0
+        )
+    axes.plot(
+        x,
+        nce,
+        color=colour,
+        lw=1.7 if thick else 1.0,
+        ls="-" if thick else (0, (4, 2)),
+        marker=marker or None,
+        ms=4.0,
+        label=curve.name,
+        zorder=3 if thick else 2.5,
+    )
+
+
+def _errors_axis(axes: Axes, curves: Curves) -> None:
+    """NCE upwards, logarithmic above LINEAR; a line where rounding to whole pixels is."""
+    errors = np.concatenate(
+        [np.concatenate([curve.training_nce, curve.test_nce]) for curve in curves.values()] or [np.empty(0)]
+    )
+    errors = errors[np.isfinite(errors)]
+    highest = max(float(errors.max(initial=0.0)), 1.2)
+    axes.set_yscale("symlog", linthresh=LINEAR, linscale=0.6)
+    lowest = float(errors.min(initial=1.0))
+    axes.set_ylim(0.7 * lowest if lowest > LINEAR else 0.0, 1.5 * highest)
+    axes.set_ylabel("NCE")
+    steps = (
+        (1.0, 2.0, 5.0) if lowest > 0.03 * highest else (1.0,)
+    )  # numbers between the powers of ten where there are few of these
+    axes.yaxis.set_major_locator(FixedLocator([0.0, *np.outer(10.0 ** np.arange(-2, 9), steps).ravel()]))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    for each in axes.figure.axes:
+        each.axhline(1.0, color=GREY, lw=0.9, ls=(0, (1, 2)), zorder=1)
+        each.annotate(
+            "rounding to whole pixels",
+            (1.0, 1.0),
+            xycoords=("axes fraction", "data"),
+            xytext=(-2, 2.5),
+            textcoords="offset points",
+            ha="right",
+            va="bottom",
+            fontsize=6.5,
+            color=GREY,
+        )

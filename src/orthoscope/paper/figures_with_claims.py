@@ -1,0 +1,227 @@
+"""Figures and tables of section 4 with what the paper claims about each, from the results of a run.
+
+EXHIBITS lists the figures that are curves over a level; a figure more is an entry more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orthoscope.geometry.arrays import ndarray
+from orthoscope.paper import claims_about_curves, claims_about_eq7
+from orthoscope.paper.claims import Claim
+from orthoscope.paper.claims_about_curves import Axis, Judge
+from orthoscope.paper.curves import Curves, curves_of
+from orthoscope.paper.entries import PAPER
+from orthoscope.paper.photographs import STUDY as PHOTOGRAPHS
+from orthoscope.paper.photographs import obliqueness
+from orthoscope.paper.section4 import PAPERS_NOISE, SCENES, Results
+from orthoscope.paper.trials import Outcome
+
+__all__ = [
+    "FigureWithClaims",
+    "Parameters",
+    "eq7_claims",
+    "fair_finding",
+    "figures_with_claims",
+    "on_photographs",
+    "parameters_of",
+    "without_noise",
+]
+
+NOISE = Axis("noise levels", "{:g} px of noise", column="noise_px", label="sigma (px)")
+POINTS = Axis("numbers of points", "{:g} points", column="points", label="points a view")
+IMAGES = Axis("numbers of images", "{:g} images", column="images", label="images")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A figure before its numbers: what it shows of which study, the claims about it; then its file's name,
+    the page's, and the scene.
+
+    even: levels at equal distances.
+    """
+
+    study: str
+    title: str
+    axis: Axis
+    judges: tuple[Judge, ...]
+    caption: str
+    even: bool = False
+    name: str = ""
+    where: str = ""
+    scene: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class FigureWithClaims:
+    """A figure with its numbers and the claims about it."""
+
+    kind: Kind
+    curves: Curves
+    claims: tuple[Claim, ...]
+
+
+def _low_and_high(kind: Kind, low: tuple[str, str], high: tuple[str, str]) -> tuple[Kind, Kind]:
+    """The same figure for low and for high distortion, each with its file's name and the page's."""
+    first, second = (
+        replace(kind, title=f"{kind.title}, {scene} distortion", scene=scene, name=name, where=where)
+        for scene, (name, where) in zip(SCENES, (low, high), strict=True)
+    )
+    return first, second
+
+
+EXHIBITS = (
+    *_low_and_high(
+        Kind(
+            "noise",
+            "NCE against pixel noise",
+            NOISE,
+            (
+                claims_about_curves.better_on_test,
+                claims_about_curves.compensated,
+                claims_about_curves.same_on_test,
+                claims_about_curves.most_sensitive,
+            ),
+            "Sigma is that of a board face on; noise grows with the tilt and is on training data only. 15"
+            " training views. Bands: standard error.",
+        ),
+        ("fig2", "Fig. 2"),
+        ("fig3", "Fig. 3"),
+    ),
+    *_low_and_high(
+        Kind(
+            "points",
+            "NCE against the number of points",
+            POINTS,
+            (claims_about_curves.better_on_test, claims_about_curves.greatest_error),
+            "Whole rows and columns spread over the board, always with the outermost ones; 15 views, sigma"
+            " 0.1 px. Bands: standard error.",
+            even=True,
+        ),
+        ("fig4", "Fig. 4"),
+        ("fig5", "Fig. 5"),
+    ),
+    *_low_and_high(
+        Kind(
+            "images",
+            "NCE against the number of images",
+            IMAGES,
+            (claims_about_curves.accurate_from_three, claims_about_curves.fewer_than_three),
+            "The first so many of the 15 training views, sigma 0.1 px. One and two views need assumptions."
+            " Bands: standard error.",
+            even=True,
+        ),
+        ("images_low", "Images, low"),
+        ("images_high", "Images, high"),
+    ),
+)
+
+FIG6 = Kind(
+    PHOTOGRAPHS,
+    "NCE against the number of points, real photographs",
+    POINTS,
+    (
+        claims_about_curves.better_on_test,
+        claims_about_curves.compensated,
+        claims_about_curves.same_on_test,
+        claims_about_curves.greatest_error,
+        claims_about_curves.better_trained,
+    ),
+    "Means over four splits; sub-grids as in figs. 4 and 5, tested on all points of the test photographs."
+    " Bands: standard error.",
+    even=True,
+    name="fig6",
+    where="Fig. 6",
+    scene=PHOTOGRAPHS,
+)
+
+
+def figures_with_claims(results: Results) -> list[FigureWithClaims]:
+    """The simulated figures, in the paper's order."""
+    return [_exhibit(kind, results.outcomes) for kind in EXHIBITS]
+
+
+def on_photographs(results: Results) -> FigureWithClaims | None:
+    """Fig. 6; None without photographs."""
+    return _exhibit(FIG6, results.on_photographs) if results.detections else None
+
+
+def _exhibit(kind: Kind, outcomes: Sequence[Outcome]) -> FigureWithClaims:
+    curves = curves_of(outcomes, study=kind.study, scene=kind.scene)
+    return FigureWithClaims(
+        kind, curves, tuple(judge(kind.where, curves, kind.axis) for judge in kind.judges)
+    )
+
+
+def without_noise(results: Results) -> tuple[Claim, ...]:
+    """What the paper says of few points without noise, in each scene."""
+    return tuple(
+        claims_about_curves.exact_without_noise(
+            f"Section 4.1, {scene}", curves_of(results.outcomes, study="exact", scene=scene), POINTS
+        )
+        for scene in SCENES
+    )
+
+
+def eq7_claims(results: Results) -> tuple[Claim, ...]:
+    """What the paper says of eq. (7)."""
+    of_scenes = (
+        claims_about_eq7.determined(f"Eq. (8), {scene}", [m for m in results.members if m.scene == scene])
+        for scene in SCENES
+    )
+    return (claims_about_eq7.perfect("Eq. (7)", results.members), *of_scenes)
+
+
+def fair_finding(results: Results) -> str:
+    """FCCM with 5 parameters against the paper's three, at the noise of figs. 4 and 5, all points."""
+    curves = {scene: curves_of(results.outcomes, study="points", scene=scene) for scene in SCENES}
+    return claims_about_curves.fair_chance(
+        curves,
+        level=float(max(columns * rows for columns, rows in results.plan.points)),
+        noise_px=PAPERS_NOISE,
+    )
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """A column of Table 1: mean errors, and of fx, fy, cu, cv (pixels) and gamma (degrees) mean and standard
+    deviation over the splits.
+    """
+
+    name: str
+    values: dict[str, tuple[float, float]]
+    training_nce: float
+    test_nce: float
+    failures: int
+
+
+def parameters_of(results: Results) -> list[Parameters]:
+    """Table 1, from all points; the paper's three first."""
+    most = max((outcome.level for outcome in results.on_photographs), default=0.0)
+    whole = [outcome for outcome in results.on_photographs if outcome.level == most]
+    names = list(dict.fromkeys([*(entry.name for entry in PAPER), *(outcome.entry for outcome in whole)]))
+    return [_parameters(name, [outcome for outcome in whole if outcome.entry == name]) for name in names]
+
+
+def _parameters(name: str, outcomes: Sequence[Outcome]) -> Parameters:
+    given = [outcome.judgement for outcome in outcomes if not outcome.judgement.failure]
+    fx, fy, cx, cy, skew = np.array([(j.fx, j.fy, j.cx, j.cy, j.skew) for j in given]).reshape(-1, 5).T
+    columns = {"fx": fx, "fy": fy, "cu": cx, "cv": cy, "gamma": obliqueness(fx, skew)}
+    return Parameters(
+        name,
+        {
+            key: (_mean(column), float(column.std(ddof=1)) if len(column) > 1 else float("nan"))
+            for key, column in columns.items()
+        },
+        _mean(np.array([j.training_nce for j in given])),
+        _mean(np.array([j.test_nce for j in given])),
+        len(outcomes) - len(given),
+    )
+
+
+def _mean(values: ndarray) -> float:
+    return float(values.mean()) if len(values) else float("nan")

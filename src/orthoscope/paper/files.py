@@ -1,0 +1,69 @@
+"""Curves, tables and single trials as CSV.
+
+Six significant digits; an empty field is a number that does not exist.  Lines end in a line feed.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from orthoscope.paper.curves import Curves
+from orthoscope.paper.eq7_searches import Eq7Search
+from orthoscope.paper.trials import Judgement, Outcome
+
+__all__ = ["curves_csv", "members_csv", "table_csv", "trials_csv"]
+
+JUDGEMENT = Judgement._fields
+
+
+def curves_csv(curves: Curves, level: str) -> str:
+    """Means over trials, a row for each level and method; level: the name of its column."""
+    columns = (level, "method", "training_nce", "test_nce", "test_nce_standard_error", "trials", "failures")
+    return table_csv(
+        columns,
+        (
+            row
+            for curve in curves.values()
+            for row in zip(
+                curve.levels,
+                [curve.name] * len(curve.levels),
+                curve.training_nce,
+                curve.test_nce,
+                curve.test_error,
+                curve.trials,
+                curve.failures,
+                strict=True,
+            )
+        ),
+    )
+
+
+def trials_csv(outcomes: Sequence[Outcome]) -> str:
+    """Every trial of every method: a row each."""
+    columns = ("study", "scene", "level", "method", "trial", *JUDGEMENT)
+    return table_csv(columns, ((o.study, o.scene, o.level, o.entry, o.trial, *o.judgement) for o in outcomes))
+
+
+def members_csv(members: Sequence[Eq7Search]) -> str:
+    """The cameras of eq. (7) and of its rivals."""
+    return table_csv(
+        ("scene", "search", "J", *JUDGEMENT), ((m.scene, m.name, m.J, *m.judgement) for m in members)
+    )
+
+
+def table_csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A header and rows."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_field(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _field(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}" if value == value else ""
+    return str(value)

@@ -1,0 +1,247 @@
+"""All of section 4 as one HTML page that needs no network.
+
+The text is paper.html.jinja, in the report's style (report/page.css) with paper.css; figures go in as SVG,
+photographs as data URIs. What the page concludes are findings (claims.py); nothing here or in the template
+knows how an experiment ends. The same results give the same bytes.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from orthoscope.geometry.numbers import ABSENT
+from orthoscope.methods import METHODS
+from orthoscope.paper.claims import Claim, Verdict, headline
+from orthoscope.paper.curves import curves_of
+from orthoscope.paper.entries import FCCM
+from orthoscope.paper.figures_with_claims import (
+    FigureWithClaims,
+    Parameters,
+    eq7_claims,
+    fair_finding,
+    figures_with_claims,
+    on_photographs,
+    parameters_of,
+    without_noise,
+)
+from orthoscope.paper.photographs import SPLITS, Straightened
+from orthoscope.paper.section4 import PAPERS_NOISE, SCENES, Results
+from orthoscope.paper.trials import TEST_VIEWS, TRAINING_VIEWS
+from orthoscope.version import __version__
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+__all__ = ["paper_page"]
+
+GAMMA_DECIMALS = 3
+LEAST_HEIGHT, FOR_EACH_CLAIM = 2.6, 0.75  # inches: a figure is about as high as the claims beside it
+
+
+class Cell(NamedTuple):
+    """An error of a table: its text, and whether it is the least of its column."""
+
+    text: str
+    best: bool = False
+
+
+def paper_page(results: Results, *, straightened: Straightened | None = None) -> str:
+    """The page as text; straightened: Fig. 7, where there are photographs."""
+    shown, real = figures_with_claims(results), on_photographs(results)
+    others = (*without_noise(results), *eq7_claims(results))
+    every = [claim for exhibit in (*shown, *([real] if real else [])) for claim in exhibit.claims] + list(
+        others
+    )
+    return _template().render(
+        version=__version__,
+        plan=results.plan,
+        training_views=TRAINING_VIEWS,
+        test_views=TEST_VIEWS,
+        splits=SPLITS,
+        noise=PAPERS_NOISE,
+        headline=headline(every),
+        every=every,
+        summary=_summary(every),
+        counts=[
+            (verdict.value, number, _tone(verdict))
+            for verdict in Verdict
+            if (number := _count(every, verdict))
+        ],
+        failures=_failures(results),
+        tone=_tone,
+        figures=[_figure(exhibit) for exhibit in shown],
+        without_noise=without_noise(results),
+        eq7=eq7_claims(results),
+        members=_members(results),
+        fair=fair_finding(results),
+        lenses=_lenses(results),
+        real=_figure(real) if real else None,
+        detections=results.detections,
+        fig7=_fig7(straightened),
+        parameters=_parameters(parameters_of(results)) if real else [],
+    )
+
+
+@cache
+def _template() -> Template:
+    """The page's template, everything escaped that is put into it; imported late, as in report/page.py."""
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+    loader = ChoiceLoader([PackageLoader("orthoscope", "paper"), PackageLoader("orthoscope", "report")])
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("paper.html.jinja")
+
+
+def _figure(exhibit: FigureWithClaims) -> dict[str, Any]:
+    """What the template needs of a figure; matplotlib is imported late, since it takes its time."""
+    from markupsafe import Markup
+
+    from orthoscope.paper.figures import nce_figure
+    from orthoscope.report.figures import to_svg
+
+    kind = exhibit.kind
+    drawn = nce_figure(
+        exhibit.curves,
+        level=kind.axis.label,
+        even=kind.even,
+        height=LEAST_HEIGHT + FOR_EACH_CLAIM * len(exhibit.claims),
+    )
+    return {
+        "name": kind.name,
+        "where": kind.where,
+        "title": kind.title,
+        "caption": kind.caption,
+        "svg": Markup(to_svg(drawn, kind.name)),
+        "claims": exhibit.claims,
+    }
+
+
+def _fig7(straightened: Straightened | None) -> dict[str, Any] | None:
+    if straightened is None:
+        return None
+    from orthoscope.report.figures import photograph_uri
+
+    return {
+        "name": straightened.name,
+        "photograph": photograph_uri(straightened.photograph),
+        "pictures": [
+            (name, None, picture) if isinstance(picture, str) else (name, photograph_uri(picture), "")
+            for name, picture in straightened.pictures
+        ],
+    }
+
+
+def _summary(every: list[Claim]) -> list[tuple[str, list[Claim]]]:
+    """Claims by what the paper says, which it may say of several figures."""
+    return [
+        (sentence, [claim for claim in every if claim.paper == sentence])
+        for sentence in dict.fromkeys(claim.paper for claim in every)
+    ]
+
+
+def _count(every: list[Claim], verdict: Verdict) -> int:
+    return sum(claim.verdict is verdict for claim in every)
+
+
+def _tone(verdict: Verdict) -> str:
+    """The class of a verdict's chip."""
+    return verdict.name.lower()
+
+
+def _failures(results: Results) -> list[tuple[str, str, str]]:
+    """Contenders whose trials gave no camera: name and study, how many of how many, and the first one's
+    reason.
+    """
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for outcome in (*results.outcomes, *results.on_photographs):
+        groups.setdefault((outcome.entry, outcome.study, outcome.scene), []).append(outcome.judgement.failure)
+    rows = []
+    for (entry, study, scene), reasons in groups.items():
+        failed = [reason for reason in reasons if reason]
+        if failed:
+            where = study if study == scene else f"{study}, {scene}"
+            rows.append((f"{entry} ({where})", f"{len(failed)} of {len(reasons)}", failed[0]))
+    return rows
+
+
+def _members(results: Results) -> list[tuple[str, list[list[str]]]]:
+    """The table of eq. (7) for each scene: search, J, fx, fy, cx, cy, test NCE."""
+    return [
+        (
+            scene,
+            [
+                [
+                    (
+                        f"literal, {m.name}"
+                        if m.literal
+                        else m.name
+                        if m.name.startswith(FCCM) or m.name == "NMLDC"
+                        else f"MLDC, {m.name}"
+                    ),
+                    f"{m.J:.0e}" if m.literal else ABSENT,
+                    *(_number(value, 1) for value in m.judgement[2:6]),
+                    _nce(m.judgement.test_nce),
+                ]
+                for m in results.members
+                if m.scene == scene
+            ],
+        )
+        for scene in SCENES
+    ]
+
+
+def _lenses(results: Results) -> list[tuple[str, str, list[Cell], str]]:
+    """Every method with every lens: method, lens, training and test NCE in each scene, failures."""
+    curves = {scene: curves_of(results.outcomes, study="lenses", scene=scene) for scene in SCENES}
+    pairs = [(method, lens, f"{method} {lens}") for method in METHODS for lens in results.plan.lenses]
+    columns = [(curves[scene], of) for scene in SCENES for of in ("training_nce", "test_nce")]
+    values = np.array(
+        [[float(getattr(of_scene[name], of)[0]) for of_scene, of in columns] for *_, name in pairs]
+    )
+    least = np.nanmin(np.where(np.isfinite(values), values, np.inf), axis=0)
+    rows = []
+    for (method, lens, name), row in zip(pairs, values, strict=True):
+        failed = [curves[scene][name] for scene in SCENES]
+        failures = f"{sum(int(c.failures[0]) for c in failed)} of {sum(int(c.trials[0]) for c in failed)}"
+        rows.append(
+            (
+                method,
+                lens,
+                [Cell(_nce(value), bool(value == best)) for value, best in zip(row, least, strict=True)],
+                failures,
+            )
+        )
+    return rows
+
+
+def _parameters(table: list[Parameters]) -> list[tuple[str, list[str]]]:
+    """Table 1 as the paper prints it, a row for each parameter and a column for each method, the names
+    first.
+    """
+    rows = [("", [column.name for column in table])]
+    labels = {"fx": "fx (px)", "fy": "fy (px)", "cu": "cu (px)", "cv": "cv (px)", "gamma": "gamma (deg)"}
+    for key, label in labels.items():
+        decimals = GAMMA_DECIMALS if key == "gamma" else 2
+        rows.append(
+            (
+                label,
+                [" ± ".join(_number(value, decimals) for value in column.values[key]) for column in table],
+            )
+        )
+    rows.append(("Training error (NCE)", [_nce(column.training_nce) for column in table]))
+    rows.append(("Testing error (NCE)", [_nce(column.test_nce) for column in table]))
+    rows.append(("Splits without a camera", [str(column.failures) for column in table]))
+    return rows
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if np.isfinite(value) else ABSENT
+
+
+def _nce(value: float) -> str:
+    return ABSENT if not np.isfinite(value) else f"{value:.3f}" if value < 10 else f"{value:.1f}"

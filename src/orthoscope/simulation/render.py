@@ -1,0 +1,333 @@
+"""Photographs of a chessboard by a known camera: each pixel's ray goes back through the lens onto the board.
+
+On the board's plane a place is (X, Y) in squares, corner 0 at (0, 0); the pattern reaches one square beyond
+the corners, the white margin another. A square is black where floor(X) + floor(Y) is even. The ray r of a
+pixel meets the plane at
+
+    (X, Y, 1) mu = M r,    M^-1 = [square R e_x   square R e_y   R p_0 + t],    mu > 0 in front
+
+Anti-aliasing is in closed form. Over a footprint of width w the mean of the square wave is (A(X + w/2) - A(X
+- w/2)) / w with A its antiderivative, a triangle wave, and the pattern is a product of one wave in X and one
+in Y. A whole pixel takes one such mean; a pixel that an edge crosses takes oversampling^2 smaller ones,
+placed by the slopes of the map from pixels to the board. Each footprint is symmetric, so edges and corners
+fall where `Camera.project` puts them, whatever the oversampling.
+
+Then what a camera adds: uneven light, Gaussian blur, cos^4 vignetting, shot and read noise, whole grey
+levels. Grey is linear in light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
+from orthoscope.geometry.pose import Pose
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lenses import Brown
+from orthoscope.simulation.scene import Scene, random_views
+from orthoscope.targets.detections import Target, chessboard
+
+__all__ = ["Renderer", "demo_scene", "photographs", "render"]
+
+ROWS = 32  # rows drawn at once, so that intermediate arrays stay small
+BLACK, WHITE, BACKGROUND = 15.0, 200.0, 90.0  # grey levels before light, vignetting and noise
+WAVES, TEXTURE = 5, 40.0  # of the background: waves along each side of the image, grey levels of the longest
+MID_GREY = 128.0  # where `noise` is meant; half of its variance is read noise, half is shot noise
+
+
+@dataclass(frozen=True, eq=False)
+class Renderer:
+    """A camera ready to photograph: what is the same in every photograph is computed once.
+
+    oversampling: sub-samples along a pixel's side where an edge crosses it. blur_px: sigma of the blur,
+    pixels. vignetting: share of the light that the farthest corner loses. noise: standard deviation at
+    mid-grey, grey levels. light: how much brighter one side is lit than the other, as a share. Raises
+    InputError for values out of range.
+    """
+
+    camera: Camera
+    oversampling: int = 4
+    blur_px: float = 0.7
+    vignetting: float = 0.3
+    noise: float = 2.0
+    light: float = 0.2
+
+    def __post_init__(self) -> None:
+        if self.oversampling < 1:
+            raise InputError(f"oversampling is {self.oversampling}; expected 1 or more.")
+        if not 0 <= self.vignetting < 1:
+            raise InputError(
+                f"vignetting is {self.vignetting}; expected a share of the light, 0 or more and below 1."
+            )
+        for name in ("blur_px", "noise", "light"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InputError(f"{name} is {getattr(self, name)}; expected 0 or more.")
+
+    def photograph(
+        self, target: Target, camera_from_target: Pose, *, rng: np.random.Generator | None = None
+    ) -> ndarray:
+        """One photograph, (h,w) uint8; black where a pixel has no ray.
+
+        rng: where background, light and noise come from; without it the background is plain, the light even
+        and there is no noise. Raises InputError for a target that is not a full chessboard.
+        """
+        sheet = _sheet(target)
+        image = (
+            np.full(self._valid.shape, BACKGROUND, dtype=np.float32)
+            if rng is None
+            else self._surroundings(rng)
+        )
+        plane_from_ray = _plane_from_ray(sheet, camera_from_target)
+        for start in range(0, len(image), ROWS):
+            self._draw(sheet, plane_from_ray, image, start)
+        if rng is not None:
+            image *= self._lighting(rng)
+        image *= self._valid
+        image = _blurred(image, self.blur_px) * self._falloff
+        if rng is not None and self.noise > 0:
+            image += self._noise(image, rng)
+        return np.rint(np.clip(image, 0.0, 255.0) * self._valid).astype(np.uint8)
+
+    @cached_property
+    def _rays(self) -> Float[ndarray, "3 h w"]:
+        """The ray of each pixel; single precision is 6e-8 radians, far below a thousandth of a pixel."""
+        width, height = self.camera.image_size
+        rays = np.empty((3, height, width), dtype=np.float32)
+        for start in range(0, height, ROWS):
+            stop = min(start + ROWS, height)
+            y, x = np.mgrid[start:stop, 0:width].astype(float).reshape(2, -1)
+            rays[:, start:stop] = self.camera.unproject(np.stack([x, y], axis=-1)).T.reshape(
+                3, stop - start, width
+            )
+        return rays
+
+    @cached_property
+    def _valid(self) -> ndarray:
+        """Which pixels (h,w) have a ray."""
+        return np.isfinite(self._rays[2])
+
+    @cached_property
+    def _falloff(self) -> Float[ndarray, "h w"]:
+        """cos^4 of an angle that grows with the distance from the principal point, so that the farthest
+        corner loses `vignetting`.
+        """
+        x, y = self._grid()
+        square = (x - self.camera.intrinsics.cx) ** 2 + (y - self.camera.intrinsics.cy) ** 2
+        angle = np.arccos((1.0 - self.vignetting) ** 0.25) * np.sqrt(square / square.max())
+        return np.cos(angle, dtype=np.float32) ** 4
+
+    def _grid(self) -> tuple[Float[ndarray, "1 w"], Float[ndarray, "h 1"]]:
+        width, height = self.camera.image_size
+        return np.arange(width, dtype=np.float32)[None], np.arange(height, dtype=np.float32)[:, None]
+
+    def _surroundings(self, rng: np.random.Generator) -> Float[ndarray, "h w"]:
+        """What is behind the board: a sum of cosines, the long ones strongest."""
+        (x, y), (width, height) = self._grid(), self.camera.image_size
+        wave = np.arange(WAVES, dtype=np.float32)
+        strength = (
+            TEXTURE
+            * rng.standard_normal((WAVES, WAVES), dtype=np.float32)
+            / (1.0 + wave[:, None] ** 2 + wave**2)
+        )
+        along_x, along_y = np.cos(np.pi * wave[:, None] * (x / width)), np.cos(np.pi * wave * (y / height))
+        return np.clip(BACKGROUND + along_y @ strength @ along_x, BLACK, WHITE)
+
+    def _lighting(self, rng: np.random.Generator) -> Float[ndarray, "h w"]:
+        """Light that is stronger on one side of the image, from a random direction; 1 in the middle."""
+        (x, y), (width, height) = self._grid(), self.camera.image_size
+        phi = float(rng.uniform(-np.pi, np.pi))
+        return 1.0 + self.light * (
+            float(np.cos(phi)) * (x / width - 0.5) + float(np.sin(phi)) * (y / height - 0.5)
+        )
+
+    def _noise(self, image: ndarray, rng: np.random.Generator) -> Float[ndarray, "h w"]:
+        sigma = self.noise * np.sqrt(0.5 + 0.5 * np.maximum(image, 0.0) / MID_GREY)
+        return sigma * rng.standard_normal(image.shape, dtype=np.float32)
+
+    def _draw(self, sheet: _Sheet, plane_from_ray: ndarray, image: ndarray, start: int) -> None:
+        """Draw the sheet over ROWS rows of the image."""
+        stop, (height, width) = min(start + ROWS, len(image)), image.shape
+        first = max(start - 1, 0)  # one row more on either side, for the slopes
+        rays = self._rays[:, first : min(stop + 1, height)]
+        plane = plane_from_ray @ rays.reshape(3, -1)
+        plane = plane[:2] / np.where(plane[2] > 0, plane[2], np.nan)
+        mine = plane[:, (start - first) * width :][:, : (stop - start) * width]
+        on_sheet = np.flatnonzero(sheet.near(*mine))
+        if len(on_sheet):
+            slopes = _slopes(plane.reshape(2, -1, width), on_sheet + (start - first) * width)
+            cover, grey = sheet.look(mine[:, on_sheet], slopes, self.oversampling)
+            block = image[start:stop].reshape(-1)
+            block[on_sheet] = block[on_sheet] * (1.0 - cover) + grey
+
+
+def render(
+    camera: Camera,
+    target: Target,
+    camera_from_target: Pose,
+    *,
+    rng: np.random.Generator | None = None,
+    oversampling: int = 4,
+    blur_px: float = 0.7,
+    vignetting: float = 0.3,
+    noise: float = 2.0,
+    light: float = 0.2,
+) -> ndarray:
+    """One photograph (h,w) uint8 of a chessboard; many of one camera are quicker from one `Renderer`, which
+    explains the settings.
+    """
+    renderer = Renderer(
+        camera, oversampling=oversampling, blur_px=blur_px, vignetting=vignetting, noise=noise, light=light
+    )
+    return renderer.photograph(target, camera_from_target, rng=rng)
+
+
+def photographs(
+    scene: Scene, *, rng: np.random.Generator, renderer: Renderer | None = None
+) -> Iterator[tuple[str, ndarray]]:
+    """Name and photograph (h,w) uint8 of each view of a scene, one after the other; renderer: by default with
+    its own defaults.
+    """
+    renderer = renderer or Renderer(scene.camera)
+    for image, pose in zip(scene.images, scene.camera_from_target, strict=True):
+        yield image, renderer.photograph(scene.target, pose, rng=rng)
+
+
+def demo_scene(*, seed: int = 0, count: int = 20) -> Scene:
+    """The scene of `orthoscope demo`: a 1280x960 camera whose straight lines are visibly bent, and a
+    chessboard that fits a sheet of A4.
+
+    Every view has the outer squares in the image, which detectors need. Many squares, hardly rolled, bring
+    corners near the image's own, where a recovered camera is least sure.
+    """
+    lens = Brown(k1=-0.31, k2=0.13, p1=0.0011, p2=-0.0007, k3=-0.025)
+    camera = Camera((1280, 960), Intrinsics(905.0, 902.0, 652.0, 467.0), lens)
+    square = 0.016
+    target = chessboard(14, 9, square)
+    views = random_views(
+        camera,
+        target,
+        count,
+        rng=np.random.default_rng(seed),
+        roll=(-0.2, 0.2),
+        fill=(0.45, 0.95),
+        margin=square,
+    )
+    return Scene(camera, target, views)
+
+
+class _Sheet(NamedTuple):
+    """A printed chessboard: where corner 0 is (metres, target frame), how large a square, how many corners
+    each way.
+    """
+
+    origin: ndarray
+    square: float
+    corners: tuple[float, float]
+
+    def near(self, x: ndarray, y: ndarray) -> ndarray:
+        """Which places are on the sheet or within half a square of it."""
+        columns, rows = self.corners
+        return (x > -2.5) & (x < columns + 1.5) & (y > -2.5) & (y < rows + 1.5)
+
+    def look(
+        self, place: Float[ndarray, "2 n"], slopes: Float[ndarray, "2 2 n"], oversampling: int
+    ) -> tuple[ndarray, ndarray]:
+        """Share of each pixel that the sheet covers, and the grey that it adds.
+
+        place: (X, Y) at the pixels' centres. slopes: d place / d pixel; [i, j] is of coordinate i along axis
+        j.
+        """
+        cover, grey = self._mean(*place, *np.hypot(slopes[:, 0], slopes[:, 1]))
+        reach = 0.5 * np.abs(slopes).sum(1)  # a pixel's square reaches so far on the board
+        crossed = np.flatnonzero((np.abs(place - np.rint(place)) <= reach).any(0))
+        if oversampling > 1 and len(crossed):
+            offset = (np.arange(oversampling) + 0.5) / oversampling - 0.5
+            offsets = np.stack(np.meshgrid(offset, offset)).reshape(2, -1)
+            sub_place = place[:, crossed, None] + np.einsum("ijn,js->ins", slopes[:, :, crossed], offsets)
+            width = np.hypot(slopes[:, 0, crossed], slopes[:, 1, crossed])[..., None] / oversampling
+            fine_cover, fine_grey = self._mean(*sub_place, *width)
+            cover[crossed], grey[crossed] = fine_cover.mean(-1), fine_grey.mean(-1)
+        return cover, grey
+
+    def _mean(self, x: ndarray, y: ndarray, width_x: ndarray, width_y: ndarray) -> tuple[ndarray, ndarray]:
+        """Cover and grey, in the mean over a footprint of these widths in squares."""
+        columns, rows = self.corners
+        board = _mean_inside(x, width_x, -1.0, columns) * _mean_inside(y, width_y, -1.0, rows)
+        waves = _mean_wave(x, width_x, -1.0, columns) * _mean_wave(y, width_y, -1.0, rows)
+        cover = _mean_inside(x, width_x, -2.0, columns + 1.0) * _mean_inside(y, width_y, -2.0, rows + 1.0)
+        return cover, WHITE * cover - (WHITE - BLACK) * 0.5 * (board + waves)
+
+
+def _sheet(target: Target) -> _Sheet:
+    """The sheet of a full chessboard.  Raises InputError for another target."""
+    if target.grid is None:
+        raise InputError(
+            f"target {target.name!r} is no full chessboard; expected one such as chessboard:9x6:25mm to draw."
+        )
+    columns, rows = target.grid
+    return _Sheet(
+        target.points[0], float(target.points[1, 0] - target.points[0, 0]), (float(columns), float(rows))
+    )
+
+
+def _plane_from_ray(sheet: _Sheet, camera_from_target: Pose) -> Float[ndarray, "3 3"]:
+    """M of the module's docstring, up to a positive factor; zeros for a board seen exactly edge on."""
+    right, down, _ = sheet.square * camera_from_target.rotation.T
+    corner = camera_from_target.apply(sheet.origin[None])[0]
+    adjugate = np.stack([np.cross(down, corner), np.cross(corner, right), np.cross(right, down)])
+    return adjugate * np.sign(adjugate[2] @ corner)
+
+
+def _slopes(plane: Float[ndarray, "2 h w"], index: Int[ndarray, " n"]) -> Float[ndarray, "2 2 n"]:
+    """d plane / d pixel at flat indices, [i, j] of coordinate i along x or y, by differences; tiny where a
+    neighbour has no place.
+    """
+    height, width = plane.shape[1:]
+    row, column = np.divmod(index, width)
+    left, right = np.maximum(column - 1, 0), np.minimum(column + 1, width - 1)
+    above, below = np.maximum(row - 1, 0), np.minimum(row + 1, height - 1)
+    flat = plane.reshape(2, -1)
+    along_x = (flat.take(index - column + right, axis=1) - flat.take(index - column + left, axis=1)) / (
+        right - left
+    )
+    along_y = (flat.take(below * width + column, axis=1) - flat.take(above * width + column, axis=1)) / (
+        below - above
+    )
+    return np.nan_to_num(np.stack([along_x, along_y], axis=1), nan=1e-6)
+
+
+def _mean_inside(x: ndarray, width: ndarray, low: float, high: float) -> ndarray:
+    """Mean over [x - width/2, x + width/2] of the function that is 1 in low..high, else 0."""
+    return (np.clip(x + 0.5 * width, low, high) - np.clip(x - 0.5 * width, low, high)) / width
+
+
+def _mean_wave(x: ndarray, width: ndarray, low: float, high: float) -> ndarray:
+    """Mean over [x - width/2, x + width/2] of the square wave in low..high: 1 where floor(x) is even, -1
+    where it is odd, 0 outside.
+    """
+    return (
+        _triangle(np.clip(x + 0.5 * width, low, high)) - _triangle(np.clip(x - 0.5 * width, low, high))
+    ) / width
+
+
+def _triangle(x: ndarray) -> ndarray:
+    """The antiderivative of the square wave: the distance from the nearest even number."""
+    return np.abs(x - 2.0 * np.rint(0.5 * x))
+
+
+def _blurred(image: Float[ndarray, "h w"], sigma: float) -> Float[ndarray, "h w"]:
+    """Gaussian blur, sigma in pixels, the image continued by its border."""
+    radius = int(np.ceil(4.0 * sigma))
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / max(sigma, 1e-9)) ** 2)
+    for _ in range(2):  # along the columns, then turned, along the rows
+        padded = np.pad(image, ((radius, radius), (0, 0)), mode="edge")
+        blurred = np.zeros_like(image)
+        for i, weight in enumerate(kernel / kernel.sum()):
+            blurred += np.float32(weight) * padded[i : i + len(image)]
+        image = blurred.T
+    return image

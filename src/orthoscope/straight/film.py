@@ -1,0 +1,148 @@
+"""Straight films: the frames of a video file as a pin-hole camera would have taken them.
+
+Frames are read and written here, in order, and mapped by an executor meanwhile, a few ahead, so that the
+cores are busy and memory does not grow with the film. A film is written beside its place and takes it when it
+is whole. Sound is not kept: OpenCV does not read it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import nullcontext
+from os import PathLike
+from pathlib import Path
+
+import cv2
+
+from orthoscope.geometry.arrays import InputError, ndarray
+from orthoscope.models.camera import Camera
+from orthoscope.straight.undistort import Straightener
+
+__all__ = ["CODECS", "is_video", "undistort_video"]
+
+CODECS = {
+    ".mp4": "mp4v",
+    ".m4v": "mp4v",
+    ".mov": "mp4v",
+    ".mkv": "mp4v",
+    ".avi": "MJPG",
+}  # what a film of that name is written with
+AHEAD = 6  # frames under way
+USUAL_RATE = 25.0  # frames a second of a film that does not say
+
+
+def is_video(path: str | PathLike[str]) -> bool:
+    """Whether a file is a film, by its name."""
+    return Path(path).suffix.lower() in CODECS
+
+
+def undistort_video(
+    path: str | PathLike[str],
+    camera: Camera,
+    place: str | PathLike[str],
+    *,
+    keep: str = "all",
+    executor: Executor | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> int:
+    """The straight film of a video file, written to `place`, whose suffix says in which format; returns the
+    number of frames.
+
+    keep: `all` or `valid`, as for photographs. executor: threads that map frames; by default as many as there
+    are cores. progress: called with (frames done, frames that the file speaks of, name). Raises InputError
+    where the file cannot be read, is of another size than the camera's, or the place cannot be written.
+    """
+    straightener, path, place = Straightener(camera, keep=keep), Path(path), Path(place)
+    with nullcontext(executor) if executor else ThreadPoolExecutor() as run, _Source(path) as source:
+        rate, total = source.get(cv2.CAP_PROP_FPS), int(source.get(cv2.CAP_PROP_FRAME_COUNT))
+        with _Film(place, rate if 0 < rate < 1e4 else USUAL_RATE, straightener) as film:
+            done = 0
+            for done, frame in enumerate(_in_order(run, straightener, _frames(source)), 1):
+                film.write(frame)
+                if progress:
+                    progress(done, max(done, total), path.name)
+            if not done:
+                raise InputError(
+                    f"{path} has no frame that can be read; expected a film. Copy it again or convert it."
+                )
+    return done
+
+
+def _in_order(
+    executor: Executor, step: Callable[[ndarray], ndarray], frames: Iterable[ndarray]
+) -> Iterator[ndarray]:
+    """What `step` makes of each frame, in their order, with no more than AHEAD under way."""
+    waiting: deque[Future[ndarray]] = deque()
+    try:
+        for frame in frames:
+            waiting.append(executor.submit(step, frame))
+            if len(waiting) == AHEAD:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def _frames(source: cv2.VideoCapture) -> Iterator[ndarray]:
+    while (read := source.read())[0]:
+        yield read[1]
+
+
+class _Source:
+    """A video file that is open for reading within a block."""
+
+    def __init__(self, path: Path) -> None:
+        if not path.is_file():
+            raise InputError(f"{path} does not exist; expected a video file. Check the name and the folder.")
+        self.source = cv2.VideoCapture(str(path))
+        if not self.source.isOpened():
+            raise InputError(
+                f"{path} is no film that can be read; expected one of {', '.join(CODECS)}. Convert it."
+            )
+
+    def __enter__(self) -> cv2.VideoCapture:
+        return self.source
+
+    def __exit__(self, *_: object) -> None:
+        self.source.release()
+
+
+class _Film:
+    """A film that is open for writing within a block, and at its place after it, unless the block failed."""
+
+    def __init__(self, place: Path, rate: float, straightener: Straightener) -> None:
+        suffix = place.suffix.lower()
+        if suffix not in CODECS:
+            raise InputError(
+                f"{place} cannot be written: {suffix or 'no suffix'} is no film; expected one of"
+                f" {', '.join(CODECS)}."
+            )
+        self.place, self.part = place, place.with_name(f".{place.stem}.{os.getpid()}.part{suffix}")
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{place} cannot be written ({error.strerror}); choose another place."
+            ) from error
+        code = cv2.VideoWriter_fourcc(*CODECS[suffix])  # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
+        self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.camera.image_size)
+
+    def __enter__(self) -> cv2.VideoWriter:
+        if not self.film.isOpened():
+            raise InputError(
+                f"{self.place} cannot be written; choose another place or another suffix:"
+                f" {', '.join(CODECS)}."
+            )
+        return self.film
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.film.release()
+        if kind is None:
+            os.replace(self.part, self.place)
+        else:
+            self.part.unlink(missing_ok=True)

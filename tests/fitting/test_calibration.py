@@ -1,0 +1,78 @@
+"""A calibration keeps its evidence; `calibrate` finds methods by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from helpers.scenes import NARROW, photographed
+from orthoscope.fitting.calibration import Uncertainty, residuals_of, rms
+from orthoscope.geometry.arrays import InputError
+from orthoscope.methods import METHODS, calibrate
+from orthoscope.methods.fccm import fccm
+
+DETECTIONS = photographed(NARROW, 4, noise_px=0.2)
+
+
+def test_calibrate_calls_the_method_with_its_settings():
+    by_name, by_hand = (
+        calibrate(DETECTIONS, method="fccm", lens="brown:k1"),
+        fccm(DETECTIONS, lens="brown:k1"),
+    )
+    assert by_name.method == "fccm"
+    assert by_name.camera.intrinsics.as_tuple() == by_hand.camera.intrinsics.as_tuple()
+
+
+def test_every_method_says_its_name_and_can_be_called_again_from_its_settings():
+    for name in METHODS:
+        first = calibrate(DETECTIONS, method=name)
+        assert first.method == name
+        again = calibrate(first.detections, method=first.method, **first.settings)
+        assert again.rms_px == first.rms_px
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"method": "magic"}, "method 'magic' is not known; expected one of decoupled, fccm"),
+        ({"lense": "brown"}, "method 'decoupled' has no setting 'lense'; it has lens, target"),
+    ],
+)
+def test_a_method_or_setting_that_is_none_is_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        calibrate(DETECTIONS, **wrong)
+
+
+def test_poses_must_match_the_views():
+    found = fccm(DETECTIONS)
+    with pytest.raises(InputError, match="3 poses for 4 views"):
+        replace(found, camera_from_target=found.camera_from_target[:3])
+
+
+def test_rms_is_over_points():
+    assert rms(np.array([[3.0, 4.0], [0.0, 0.0]])) == pytest.approx(5.0 / np.sqrt(2.0))
+
+
+def test_a_tied_parameter_gives_both_its_deviation():
+    uncertainty = Uncertainty(("fx=fy", "k1"), np.diag([4.0, 0.25]))
+    assert uncertainty.deviations == {"fx": 2.0, "fy": 2.0, "k1": 0.5}
+
+
+def test_residuals_go_on_beyond_the_lens_s_domain_as_least_squares_does():
+    found = fccm(DETECTIONS)
+    folding = replace(
+        found.camera, lens=found.camera.lens.with_coefficients(k1=-8.0, k2=0.0, k3=0.0)
+    )  # folds at 12 degrees
+    e = np.concatenate(residuals_of(folding, found.camera_from_target, DETECTIONS))
+    assert np.isnan(folding.project(found.camera_from_target[0].apply(DETECTIONS.target.points))).any()
+    assert np.isfinite(e).all()
+
+
+def test_residuals_of_views_are_in_their_order_and_of_their_corners():
+    found = fccm(DETECTIONS)
+    sizes = [len(e) for e in found.residuals()]
+    assert sizes == [len(view.ids) for view in DETECTIONS.views]
+    assert_allclose(found.rms_px**2 * sum(sizes), sum((e**2).sum() for e in found.residuals()))

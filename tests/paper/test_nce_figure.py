@@ -1,0 +1,42 @@
+"""The figure shows what the curves say, whatever they say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from helpers.made_up import curve, curves
+from orthoscope.paper.figures import nce_figure
+from orthoscope.report.figures import to_svg
+
+
+def test_both_panels_show_every_contender_and_the_paper_s_three_are_thick():
+    figure = nce_figure(
+        curves(FCCM=[1.0, 2.0], NMLDC=[0.0, 0.02], MLDC=[3.0, 3.0], other=[0.5, 0.5]), level="sigma (px)"
+    )
+    for axes in figure.axes:
+        width = {
+            line.get_label(): line.get_linewidth()
+            for line in axes.lines
+            if not str(line.get_label()).startswith("_")
+        }
+        assert set(width) == {"FCCM", "NMLDC", "MLDC", "other"}
+        assert width["other"] < min(width[name] for name in ("FCCM", "NMLDC", "MLDC"))
+        assert axes.get_xlabel() == "sigma (px)"
+
+
+def test_errors_of_nothing_have_a_place_on_the_axis():
+    below = nce_figure(curves(FCCM=[0.0, 2.0]), level="x").axes[0].get_ylim()[0]
+    assert below == 0.0
+    low, high = nce_figure(curves(FCCM=[0.8, 2.0]), level="x").axes[0].get_ylim()
+    assert 0.1 < low < 0.8
+    assert high > 2.0
+
+
+def test_where_no_method_gave_a_camera_the_figure_says_so():
+    figure = nce_figure({"MLDC": curve("MLDC", [np.nan, np.nan])}, level="images", even=True)
+    assert "no method gave a camera" in to_svg(figure, "none")
+
+
+def test_the_same_curves_give_the_same_bytes():
+    first, again = (to_svg(nce_figure(curves(FCCM=[1.0, 2.0]), level="x"), "fig") for _ in range(2))
+    assert first == again

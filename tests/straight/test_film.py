@@ -1,0 +1,101 @@
+"""Straight films: as many frames as there were, in their order, and whole or not there."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from orthoscope.geometry.arrays import InputError
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lenses import Brown
+from orthoscope.straight.film import CODECS, is_video, undistort_video
+from orthoscope.straight.undistort import Straightener
+
+SIZE, FRAMES, RATE = (160, 120), 40, 12.5
+CAMERA = Camera(SIZE, Intrinsics(120.0, 120.0, 80.0, 60.0), Brown(k1=-0.2))
+
+
+def filmed(i: int) -> np.ndarray:
+    """A picture that brightens from left to right, and with i."""
+    return np.repeat(
+        (np.linspace(0, 120, 160)[None, :, None] + 3.0 * i).astype(np.uint8), 120, axis=0
+    ).repeat(3, axis=2)
+
+
+FILMED = [filmed(i) for i in range(FRAMES)]
+
+
+@pytest.fixture(params=sorted(CODECS))
+def film(request, tmp_path):
+    path = tmp_path / f"film{request.param}"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*CODECS[request.param]), RATE, SIZE)
+    for picture in FILMED:
+        writer.write(picture)
+    writer.release()
+    return path
+
+
+def frames_of(path) -> list[np.ndarray]:
+    source, frames = cv2.VideoCapture(str(path)), []
+    while (read := source.read())[0]:
+        frames.append(read[1])
+    return frames
+
+
+def test_each_frame_comes_out_straight_and_in_its_place(film, tmp_path):
+    told = []
+    place = tmp_path / "straight" / film.name
+    assert undistort_video(film, CAMERA, place, keep="valid", progress=lambda *at: told.append(at)) == FRAMES
+    straightener = Straightener(CAMERA, keep="valid")
+    straight, expected = (
+        [picture.astype(float) for picture in pictures]
+        for pictures in (frames_of(place), map(straightener, FILMED))
+    )
+    assert len(straight) == FRAMES
+    assert cv2.VideoCapture(str(place)).get(cv2.CAP_PROP_FPS) == pytest.approx(RATE, rel=1e-3)
+    for i, (picture, wanted) in enumerate(zip(straight, expected, strict=True)):
+        # codecs shift all colours by up to 5 and lose some; the frame before would be 3 away
+        assert np.median(np.abs((picture - straight[0]) - (wanted - expected[0]))) < 1.5, i
+    assert told == [(i + 1, FRAMES, film.name) for i in range(FRAMES)]
+    assert list(place.parent.iterdir()) == [place]
+
+
+def test_what_is_a_film_is_told_by_its_name():
+    assert is_video("clip.MP4")
+    assert not is_video("clip.png")
+
+
+@pytest.mark.parametrize("name", ["film.png", "film"])
+def test_a_place_that_is_no_film_is_refused(tmp_path, name):
+    (tmp_path / "a.avi").write_bytes(b"")
+    with pytest.raises(InputError, match=r"expected one of \.mp4"):
+        undistort_video(tmp_path / "a.avi", CAMERA, tmp_path / name)
+
+
+def test_a_film_that_is_not_there_or_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"missing\.mp4 does not exist"):
+        undistort_video(tmp_path / "missing.mp4", CAMERA, tmp_path / "out/a.mp4")
+    (tmp_path / "text.mp4").write_text("no film")
+    with pytest.raises(InputError, match=r"text\.mp4 is no film"):
+        undistort_video(tmp_path / "text.mp4", CAMERA, tmp_path / "out/a.mp4")
+
+
+@pytest.mark.parametrize("failure", [KeyboardInterrupt, InputError])
+def test_a_film_that_is_stopped_leaves_nothing_behind(film, tmp_path, failure):
+    place = tmp_path / "straight" / film.name
+
+    def stop(done, total, name):
+        if done == 10:
+            raise failure
+
+    with pytest.raises(failure):
+        undistort_video(film, CAMERA, place, progress=stop)
+    assert list(place.parent.iterdir()) == []
+
+
+def test_a_film_of_another_size_is_refused_and_nothing_is_left_behind(film, tmp_path):
+    camera = Camera((640, 480), CAMERA.intrinsics, CAMERA.lens)
+    with pytest.raises(InputError, match=r"160x120; this camera was calibrated at 640x480"):
+        undistort_video(film, camera, tmp_path / "straight/film.mp4")
+    assert list((tmp_path / "straight").iterdir()) == []
