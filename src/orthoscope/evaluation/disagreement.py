@@ -26,16 +26,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.models.difference import image_difference
 from orthoscope.evaluation.misfit.f_distribution import f_survival
 from orthoscope.fitting.leave_one_out import hat_of
 from orthoscope.fitting.linearised import Linearised
-from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.targets.detections import Detections
 from orthoscope.fitting.reprojection import with_parameters
+from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
+from orthoscope.models.difference import image_difference
+from orthoscope.targets.detections import Detections
 
-__all__ = ["Disagreement", "Wishes", "changes_of", "disagreement", "spread_of", "wishes"]
+__all__ = ["AGREED", "Disagreement", "Wishes", "changes_of", "disagreement", "spread_of", "wishes"]
 
 STEP = 0.01  # of the focal length or of the image's width: a change of K that counts as 1
 FAINT = 1e-3  # of the largest: an eigenvalue of T_j below it is no wish

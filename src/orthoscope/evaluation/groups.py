@@ -22,16 +22,16 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.evaluation.disagreement import Disagreement, changes_of, spread_of
+from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of, leave_one_out
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
-from orthoscope.targets.detections import Detections
-from orthoscope.fitting.calibration import residuals_of
-from orthoscope.methods.fccm import fccm
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
-from orthoscope.fitting.resection import resect
+from orthoscope.methods.fccm import fccm
 from orthoscope.models.lenses import FREE
+from orthoscope.targets.detections import Detections
 
 __all__ = ["Groups", "two_groups"]
 

@@ -17,8 +17,14 @@ from orthoscope.evaluation.misfit.f_distribution import f_survival
 from orthoscope.evaluation.misfit.whitening import FAINT, Whitening
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["Agreement", "MisfitTest", "agreement"]
+__all__ = ["Agreement", "MisfitTest", "agreement", "is_misfit"]
 
+SURE = (
+    0.01  # p-value of a misfit: one perfect set in a hundred is blamed for its target, and one for its lens
+)
+SURE_OVER_VIEWS = 0.05  # or, with too few views to get there, the least p-value that they can give
+TELLING = 0.25  # of the noise: a misfit that is smaller adds less than a thirtieth to the error
+NEGLIGIBLE = 0.01  # px: no misfit that is smaller matters to anyone
 FEWEST_VIEWS = 3  # with fewer, "the same in all views" means nothing
 FEWEST_WITHIN = 10  # degrees of freedom left for the noise
 ALL_SIGNS = 11  # views up to which every combination of signs is tried; with more, as many at random
@@ -42,6 +48,12 @@ class MisfitTest:
     p_over_views: float
     systematic_px: float
     noise_px: float
+
+
+def is_misfit(test: MisfitTest, views: int) -> bool:
+    """Whether a misfit is certain, by the F test and by the vote of the views, and large enough to matter."""
+    certain = test.p_value < SURE and test.p_over_views <= max(SURE_OVER_VIEWS, 2.0 ** (1 - views))
+    return certain and test.systematic_px > max(TELLING * test.noise_px, NEGLIGIBLE)
 
 
 class Agreement(NamedTuple):

@@ -56,9 +56,9 @@ from orthoscope.evaluation.misfit.f_test import Agreement, MisfitTest, agreement
 from orthoscope.evaluation.misfit.jacobian import Slopes, parameters_of, slopes_of, stepped
 from orthoscope.evaluation.misfit.whitening import Whitening
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.models.camera import Camera
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.cells import Cells, cells_for
+from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
 
 __all__ = ["LensMisfit", "Misfit", "MisfitTest", "TargetMisfit", "misfit"]
