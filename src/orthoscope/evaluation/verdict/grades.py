@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
 
-__all__ = ["GRADES", "Grade", "by_error", "lower"]
+__all__ = ["GRADES", "WIDE", "Grade", "by_error", "lower"]
 
 WIDE = 0.7  # of the frame: what is left is corners of it that a board rarely reaches
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FINE_PX", "Situation", "coarse_px"]
+__all__ = ["FINE_PX", "NOTHING_KNOWN", "Situation", "coarse_px"]
 
 FINE_PX = 0.5  # a camera that is off by no more serves everyone: corners are found to about that
 COARSE_PX = 2.0  # in an image of 1000 pixels: a camera that is off by more serves nobody
@@ -27,6 +27,7 @@ class Situation:
         error_px: how far off the camera is, rms over the seen part; NaN where nothing says.
         coarse_px: error above which it is of no use.
         share: of the frame over which it is off by FINE_PX at most.
+        covered: share of the frame's cells that corners were seen in.
         place: of the frame where corners are missing, in words.
         noise_px: of a found corner, per point.
         tilt: of the target against the line of sight, degrees, in the photograph that has most but one.
@@ -58,6 +59,7 @@ class Situation:
     error_px: float = 0.1
     coarse_px: float = COARSE_PX
     share: float = 1.0
+    covered: float = 1.0
     place: str = "in the middle"
     noise_px: float = 0.1
     tilt: float = 40.0
@@ -76,6 +78,9 @@ class Situation:
     target_mm: float = 0.0
     suspects: tuple[tuple[str, str], ...] = ()
     precious: tuple[tuple[str, str], ...] = ()
+
+
+NOTHING_KNOWN = Situation(error_px=float("nan"), share=0.0)
 
 
 def coarse_px(image_size: tuple[int, int]) -> float:
