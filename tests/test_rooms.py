@@ -1,4 +1,4 @@
-"""The contract between the floors has been seen to break."""
+"""The contract between the rooms has been seen to break."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def tree(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_floors_are_kept(tree):
+def test_the_contract_between_the_rooms_is_kept(tree):
     result = lint_imports(tree)
     assert result.returncode == 0, result.stdout + result.stderr
 
 
-def test_an_import_from_a_higher_floor_breaks_the_contract(tree):
+def test_an_import_of_a_room_above_breaks_the_contract(tree):
     planted = tree / "src" / "orthoscope" / "geometry" / "pose.py"
     planted.write_text(planted.read_text() + "\n\nfrom orthoscope.models import camera  # noqa\n")
     result = lint_imports(tree)
@@ -53,7 +53,7 @@ def test_an_import_from_a_higher_floor_breaks_the_contract(tree):
     assert "orthoscope.geometry.pose -> orthoscope.models.camera" in result.stdout
 
 
-def test_a_new_folder_without_a_floor_breaks_the_contract(tree):
+def test_a_new_folder_that_the_contract_does_not_name_breaks_it(tree):
     attic = tree / "src" / "orthoscope" / "attic"
     attic.mkdir()
     (attic / "__init__.py").write_text("")

@@ -7,7 +7,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 from helpers.laws import for_every_lens
-from helpers.scenes import BOARD, NARROW, WIDE, camera_with, facing, photographed, seen, some_corners
+from helpers.scenes import (
+    BOARD,
+    NARROW,
+    WIDE,
+    camera_with,
+    facing,
+    photographed,
+    seen,
+    some_corners,
+    turned_boards,
+)
 from orthoscope.fitting.closed_form import (
     CENTRED,
     CENTRED_SQUARE,
@@ -107,13 +117,6 @@ def test_poses_are_exact_for_every_lens(lens: Lens):
     )  # what lies on its ring or in its hole is no part of the image
     # rounding of pixels, 1e-13 of 500, times the condition of a homography: 1e3, and beside a ring more
     assert_poses_exact(camera, detections, near_the_axis, atol=1e-7 if torn else 1e-9)
-
-
-def turned_boards() -> tuple[np.ndarray, np.ndarray]:
-    """Four boards within 20 degrees of the axis."""
-    w = np.array([[0.0, 0.0, 0.0], [0.4, 0.1, 0.0], [-0.2, 0.5, 1.0], [0.1, -0.3, 3.0]])
-    middle = np.array([[0.0, 0.0, 0.8], [0.05, 0.0, 0.9], [-0.05, 0.05, 0.8], [0.0, -0.05, 1.0]])
-    return w, middle - np.einsum("vij,j->vi", rotation_from_vector(w), BOARD.points.mean(0))
 
 
 def test_poses_are_exact_past_90_degrees_and_for_partial_boards():

@@ -6,10 +6,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
-from test_closed_form import turned_boards
 
 from helpers.laws import for_every_lens
-from helpers.scenes import BOARD, NARROW, WIDE, K, camera_with, photographed, seen, some_corners
+from helpers.scenes import (
+    BOARD,
+    NARROW,
+    WIDE,
+    K,
+    camera_with,
+    photographed,
+    seen,
+    some_corners,
+    turned_boards,
+)
 from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError

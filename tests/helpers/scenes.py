@@ -28,6 +28,7 @@ __all__ = [
     "photographed",
     "seen",
     "some_corners",
+    "turned_boards",
     "worst_image",
 ]
 
@@ -103,3 +104,10 @@ def worst_image(camera: Camera, other: Camera, detections: Detections, samples: 
     covered = np.concatenate([pixels, grid[(grid @ sides[:, :2].T + sides[:, 2] <= 0.0).all(1)]])
     covered = covered[np.isfinite(camera.unproject(covered)[:, 0])]
     return float(image_difference(camera, other, covered).max())
+
+
+def turned_boards() -> tuple[np.ndarray, np.ndarray]:
+    """Four boards within 20 degrees of the axis."""
+    w = np.array([[0.0, 0.0, 0.0], [0.4, 0.1, 0.0], [-0.2, 0.5, 1.0], [0.1, -0.3, 3.0]])
+    middle = np.array([[0.0, 0.0, 0.8], [0.05, 0.0, 0.9], [-0.05, 0.05, 0.8], [0.0, -0.05, 1.0]])
+    return w, middle - np.einsum("vij,j->vi", rotation_from_vector(w), BOARD.points.mean(0))

@@ -16,8 +16,8 @@ __all__ = ["compare"]
 
 EXAMPLE = """\b
 Example:
-  $ orthoscope compare photos/ --target chessboard:9x6:25mm --with decoupled --with decoupled:brown --with fccm:brown
-  views      14 used, 0 set aside; 756 corners; 5 folds held out
+  $ orthoscope compare photos/ --target chessboard:9x6:25mm --with decoupled --with decoupled:brown --with
+  fccm:brown views      14 used, 0 set aside; 756 corners; 5 folds held out
                    held out (px)     loses (px)    NCE  used (px)  parameters  seconds  lens   target
   decoupled        0.088 ± 0.015           best  0.180      0.067         162     3.30  free   free
   decoupled:brown  0.090 ± 0.013  0.002 ± 0.002  0.189      0.074         141     3.04  brown  free
@@ -28,8 +28,8 @@ Example:
   wrote      comparison/compare.json, comparison/compare.html, comparison/compare.svg
 
 \b
-WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or decoupled:brown:target=flat.
-PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or
+decoupled:brown:target=flat. PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
 Exit: 0 done, 1 the photographs are too few to hold any out, 2 the command is wrong.
 """
 HEADINGS = ("", "held out (px)", "loses (px)", "NCE", "used (px)", "parameters", "seconds", "lens", "target")

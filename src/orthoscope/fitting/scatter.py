@@ -101,7 +101,7 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
 
 def patterns_over_views(
     fit: Linearised, points: Float[ndarray, "p 3"], *, orders: Sequence[int] = ORDERS
-) -> list[Float[ndarray, "m n c"]]:
+) -> list[Float[ndarray, "_ _ _"]]:
     """Smooth patterns over the board, in u and in v, as weighted residuals of each view: orthonormal, pose
     and lower orders taken out.
 
@@ -125,7 +125,7 @@ def patterns_over_views(
     return np.split(basis, np.cumsum(sizes)[:-1], axis=2)
 
 
-def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "m n c"]]) -> tuple[float, ...]:
+def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "_ _ _"]]) -> tuple[float, ...]:
     """tau_o, 1 or more: how much larger each order's patterns are in the residuals than independent errors
     would make them.
     """

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from orthoscope.fitting.board_order import in_one_order
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.identifiability import check_enough, check_known, told
 from orthoscope.fitting.initial_camera import Assumptions, StartingCameras, starts, suited_lens
@@ -28,7 +29,7 @@ from orthoscope.solve.losses import LOSSES, Loss
 from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__
 
-__all__ = ["fccm"]
+__all__ = ["fccm", "fit_flat"]
 
 AUTO = "auto"
 # share of the cost; of a million numbers that is 1e-4 of one's variance: nothing known moves by 1 % of its
@@ -62,6 +63,30 @@ def fccm(
     starts to matter, pixels. progress: called after each step with (step, cost). Raises CalibrationError
     where the views cannot tell the camera, InputError for a setting that is none.
     """
+    return in_one_order(
+        fit_flat(
+            detections,
+            lens=lens,
+            skew=skew,
+            loss=loss,
+            loss_scale=loss_scale,
+            max_steps=max_steps,
+            progress=progress,
+        )
+    )
+
+
+def fit_flat(
+    detections: Detections,
+    *,
+    lens: str = AUTO,
+    skew: bool = False,
+    loss: str = "linear",
+    loss_scale: float = 1.0,
+    max_steps: int = 200,
+    progress: Callable[[int, float], None] | None = None,
+) -> Calibration:
+    """`fccm` with the corners of every view listed as they came; settings as there."""
     if loss not in LOSSES:
         raise InputError(f"loss {loss!r} is not known; expected one of {', '.join(LOSSES)}.")
     used = with_usable_views(detections)

@@ -22,12 +22,13 @@ import numpy as np
 
 from orthoscope.fitting.observations import Chunk, Observations, Poses
 from orthoscope.fitting.reprojection import POSE, Estimate, Places, Reprojection
+from orthoscope.fitting.residual_slopes import by_corner, spline_values
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.solve.losses import Linear, Loss
 
-__all__ = ["MeasurementSums", "Measurements", "by_corner", "spline_unknowns", "spline_values"]
+__all__ = ["MeasurementSums", "Measurements", "spline_unknowns"]
 
 SPACE = 3
 
@@ -160,15 +161,6 @@ def _residuals(stacked: Float[ndarray, "v columns n2"]) -> Float[ndarray, "v n 2
     return stacked[:, -1].reshape(len(stacked), 2, -1).transpose(0, 2, 1)
 
 
-def by_corner(
-    by_translation: Float[ndarray, "v 3 n2"], rotation: Float[ndarray, "v 3 3"]
-) -> Float[ndarray, "v n 3 2"]:
-    """d(u, v) by the place of each corner in the target's frame."""
-    views, _, rows = by_translation.shape
-    turned = (rotation.transpose(0, 2, 1) @ by_translation).reshape(views, SPACE, 2, rows // 2)
-    return np.ascontiguousarray(turned.transpose(0, 3, 1, 2))
-
-
 def _add_camera_and_poses(sums: MeasurementSums, stacked: ndarray, rows: slice, k: int) -> None:
     gram = stacked @ stacked.transpose(0, 2, 1)
     sums.zz[:k, :k] += gram[:, :k, :k].sum(0)
@@ -184,12 +176,6 @@ def _add_corners(sums: MeasurementSums, stacked: ndarray, turned: ndarray, rows:
     sums.cc[:] += (turned @ turned.transpose(0, 1, 3, 2)).sum(0)
     sums.c[:] += products[..., -1].sum(0)
     sums.vc[rows] = products[..., k:-1].transpose(0, 1, 3, 2)
-
-
-def spline_values(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "v p g"]:
-    """The value of every spline at every corner's place in the base's distorted plane."""
-    in_camera = np.einsum("vab,pb->avp", poses.rotation, points) + poses.translation.T[:, :, None]
-    return lens.over.lattice.design(*lens.base.warp(*lens.chart.flatten(*in_camera)))
 
 
 def _add_spline(

@@ -18,10 +18,11 @@ import numpy as np
 
 from orthoscope.fitting.leave_one_out import LeaveOneOut, scattered
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.residual_slopes import slopes_of
 from orthoscope.fitting.scatter import Scatter, likenesses, patterns_over_views
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.decoupled.step_one import StepOneFit
-from orthoscope.methods.decoupled.step_one_linearised import roots_of, slopes_of
+from orthoscope.methods.decoupled.step_one_linearised import roots_of
 from orthoscope.models.camera import Camera
 
 __all__ = ["PairsLeftOut"]
