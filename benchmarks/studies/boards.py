@@ -1,8 +1,8 @@
 """Boards as they are: what real ones do to their corners, by kind, in shares of the board's own size.
 
-`stretch` (a printer that feeds too far), `bend` (a sheet on a tube), `sag` (a sheet held at two sides), `wave` (moist paper),
-`singles` (each corner somewhere else, as on a screen taken by a poor camera), `dent`.  Sizes as found on real boards: surface
-.02 to .07 % of the size, single corners .01 to .06 %.
+`stretch` (a printer that feeds too far), `bend` (a sheet on a tube), `sag` (a sheet held at two sides),
+`wave` (moist paper), `singles` (each corner somewhere else, as on a screen taken by a poor camera), `dent`.
+Sizes as found on real boards: surface .02 to .07 % of the size, single corners .01 to .06 %.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ def shaped(points: ndarray, shape: dict[str, float], rng: np.random.Generator) -
 
 
 def smooth_height(points: ndarray, share: float, rng: np.random.Generator) -> ndarray:
-    """The same board (m,3) with a height of the second order at random, each coefficient N(0, share of the size)."""
+    """The same board (m,3) with a height of the second order at random, each coefficient N(0, share of the
+    size).
+    """
     size = size_of(points)
     x, y = 2.0 * (points[:, :2] - points[:, :2].mean(0)).T / size
     a, b, c = share * size * rng.normal(size=3)

@@ -1,9 +1,10 @@
 """Cameras that are not this project's own: what a verdict is judged against must not share its mistakes.
 
-`brown` and its richer kin are cv2.projectPoints (4, 5, 8, 12 or 14 coefficients).  `fisheye` is the odd polynomial of the
-angle, theta (1 + k1 theta^2 + ... + k4 theta^8), which cv2.fisheye.projectPoints is in front of the camera and which goes on
-past 90 degrees.  A `port` is a flat window into water: a ray is bent once, by Snell's law, and the camera has no single
-centre.  A telephone that was turned over writes the same picture upside down.
+`brown` and its richer kin are cv2.projectPoints (4, 5, 8, 12 or 14 coefficients).  `fisheye` is the odd
+polynomial of the angle, theta (1 + k1 theta^2 + ... + k4 theta^8), which cv2.fisheye.projectPoints is in
+front of the camera and which goes on past 90 degrees.  A `port` is a flat window into water: a ray is bent
+once, by Snell's law, and the camera has no single centre.  A telephone that was turned over writes the same
+picture upside down.
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ class Projector:
     turned: bool = False
 
     def pixels(self, points: ndarray) -> ndarray:
-        """Where points (n,3), camera frame, are seen (n,2); NaN behind the camera, or where the lens has folded over."""
+        """Where points (n,3), camera frame, are seen (n,2); NaN behind the camera, or where the lens has
+        folded over.
+        """
         points = np.asarray(points, dtype=float).reshape(-1, 3)
         if self.port:
             points = _through_water(points, self.port)
@@ -62,7 +65,9 @@ class Projector:
         return replace(self, centre=(self.centre[0] + x, self.centre[1] + y))
 
     def directions(self, pixels: ndarray) -> ndarray:
-        """Unit vectors (n,3) seen near pixels (n,2): those of the nearest entry of a table, good to a degree or two."""
+        """Unit vectors (n,3) seen near pixels (n,2): those of the nearest entry of a table, good to a degree
+        or two.
+        """
         towards, at = self._table
         nearest = [int(np.nanargmin(((at - pixel) ** 2).sum(1))) for pixel in np.reshape(pixels, (-1, 2))]
         return towards[nearest]
@@ -119,7 +124,9 @@ class Projector:
 
 
 def _through_water(points: ndarray, port: float) -> ndarray:
-    """Points in the direction, in air, by which the camera sees points that are in water behind a window at z = port."""
+    """Points in the direction, in air, by which the camera sees points that are in water behind a window at z
+    = port.
+    """
     across, depth = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
     low, high = np.zeros(len(points)), np.full(len(points), 0.5 * np.pi - 1e-9)
     for _ in range(BISECTIONS):

@@ -1,8 +1,10 @@
-"""What a verdict must say, scenario by scenario: one entry is a name, a recipe, how it is calibrated, and what is right.
+"""What a verdict must say, scenario by scenario: one entry is a name, a recipe, how it is calibrated, and
+what is right.
 
-`grades` and `causes` are all that would be right.  Where the photographs leave it to chance how good the camera becomes (few
-views, little tilt), more than one grade is right, and the rules that hold everywhere (truth_table.py) judge the rest: nothing
-is called good whose true error is above a pixel or three times the predicted one, nothing is thrown away that is good.
+`grades` and `causes` are all that would be right.  Where the photographs leave it to chance how good the
+camera becomes (few views, little tilt), more than one grade is right, and the rules that hold everywhere
+(truth_table.py) judge the rest: nothing is called good whose true error is above a pixel or three times the
+predicted one, nothing is thrown away that is good.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Where a board stands in each photograph: an aim in the image, a tilt, a roll and a size, drawn until it can be seen."""
+"""Where a board stands in each photograph: an aim in the image, a tilt, a roll and a size, drawn until it can
+be seen.
+"""
 
 from __future__ import annotations
 

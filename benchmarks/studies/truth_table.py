@@ -1,13 +1,14 @@
 """The truth table: what the verdict says of photographs whose truth is known, and whether that is right.
 
-    python -m benchmarks.studies.truth_table               ten seeds of every scenario; writes docs/measured/verdict.md
-    python -m benchmarks.studies.truth_table --seeds 2 --only zoom
+    python -m benchmarks.studies.truth_table               ten seeds of every scenario; writes
+    docs/measured/verdict.md python -m benchmarks.studies.truth_table --seeds 2 --only zoom
 
-Every scenario (scenarios.py) is made by cameras that are not this project's, calibrated and evaluated as a user would. A verdict
-is right where its grade and its cause are among those that the scenario names, and, where two cameras are named, no photograph
-is in the wrong group. Beside that two rules hold everywhere: nothing is called good whose true error is above 1 px or above
-three times the predicted one; nothing is thrown away that is off by less than 0.1 px and less than the corners' noise.
-Rows are kept in a file as they are found, so that a run that was stopped goes on.
+Every scenario (scenarios.py) is made by cameras that are not this project's, calibrated and evaluated as a
+user would. A verdict is right where its grade and its cause are among those that the scenario names, and,
+where two cameras are named, no photograph is in the wrong group. Beside that two rules hold everywhere:
+nothing is called good whose true error is above 1 px or above three times the predicted one; nothing is
+thrown away that is off by less than 0.1 px and less than the corners' noise. Rows are kept in a file as they
+are found, so that a run that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -18,19 +19,23 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks.studies.scenarios import REFUSED, SCENARIOS, Scenario
 from benchmarks.studies.worlds import World, made, true_error
 from orthoscope import CalibrationError, Detections, View, chessboard
-from orthoscope.evaluation.evaluate import Evaluation, evaluate
+from orthoscope.evaluation.evaluate import examine
+from orthoscope.evaluation.verdict.facts import situation_of
 from orthoscope.evaluation.verdict.grades import GRADES, Grade
+from orthoscope.evaluation.verdict.situation import Situation
+from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
 from orthoscope.methods import calibrate
 
-__all__ = ["Row", "breach", "judged", "page"]
+__all__ = ["Row", "judged", "page"]
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/measured/verdict.md"
@@ -44,99 +49,92 @@ NEAR_PX = 0.1  # a camera that is off by less, and by less than the noise, is no
 
 
 class Row(NamedTuple):
-    """One scenario with one seed.
+    """One scenario with one seed: the facts that were found. Grade and words are made of them anew.
 
     Args:
         scenario: its name.
         seed: of its world.
-        grade, cause: of the verdict; `refused` where calibrate said that the photographs cannot tell.
-        right: whether both are among those that the scenario names.
-        true_px, predicted_px: how far off the camera is; NaN where there is none.
-        noise_px: of a corner, per point.
+        facts: what the verdict is made from; None where calibrate said that the photographs cannot tell.
+        true_px: how far off the camera is; NaN where there is none.
         grouped: photographs named, and those of them in the wrong group; None where no groups were named.
-        told: the verdict's words.
     """
 
     scenario: str
     seed: int
-    grade: str
-    cause: str
-    right: bool
+    facts: dict[str, Any] | None
     true_px: float
-    predicted_px: float
-    noise_px: float
     grouped: tuple[int, int] | None
-    told: str
+
+    @property
+    def of(self) -> Scenario:
+        """The scenario."""
+        return next(scenario for scenario in SCENARIOS if scenario.name == self.scenario)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """What is said; None where there is no calibration."""
+        return verdict_on(Situation(**self.facts)) if self.facts else None
+
+    @property
+    def grade(self) -> str:
+        """Of the verdict."""
+        return str(self.verdict.grade) if self.verdict else REFUSED
+
+    @property
+    def cause(self) -> str:
+        """Of the verdict."""
+        return self.verdict.cause if self.verdict else REFUSED
+
+    @property
+    def predicted_px(self) -> float:
+        """How far off the camera is said to be."""
+        return self.facts["error_px"] if self.facts else float("nan")
+
+    @property
+    def right(self) -> bool:
+        """Whether grade and cause are among those that the scenario names, and groups are as they were."""
+        grouped = self.grouped is None or (self.of.groups and self.grouped[1] == 0)
+        return self.grade in self.of.grades and self.cause in self.of.causes and grouped
+
+    @property
+    def breach(self) -> str:
+        """Which of the rules that hold everywhere is broken; empty for none."""
+        if self.grade in (Grade.GOOD, Grade.REGION) and (
+            self.true_px > FAR_PX or self.true_px > OFTEN * self.predicted_px
+        ):
+            return "called good"
+        recipe = self.of.recipe
+        noise = float(np.sqrt(2.0) * np.hypot(recipe.noise, recipe.alike))
+        return "thrown away" if self.grade == Grade.NO and self.true_px < min(NEAR_PX, noise) else ""
 
 
 def judged(scenario: Scenario, seed: int) -> Row:
-    """What the verdict says of a scenario's world, and whether it is right."""
+    """What is found of a scenario's world."""
     world = made(scenario.recipe, seed)
-    noise = float(np.sqrt(2.0) * np.hypot(scenario.recipe.noise, scenario.recipe.alike))
     board = chessboard(*(scenario.board or scenario.recipe.board))
     views = tuple(View(*photograph) for photograph in world.photographs)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            calibration = calibrate(
-                Detections(board, scenario.recipe.camera.size, views), **scenario.settings
-            )
-            found = evaluate(calibration)
-    except CalibrationError as error:
-        nothing = float("nan")
-        right = REFUSED in scenario.grades
-        return Row(
-            scenario.name,
-            seed,
-            REFUSED,
-            REFUSED,
-            right,
-            nothing,
-            nothing,
-            noise,
-            None,
-            str(error).split(".")[0],
-        )
-    pixels = np.concatenate([view.pixels for view in found.calibration.detections.views])
+            detections = Detections(board, scenario.recipe.camera.size, views)
+            calibration = calibrate(detections, **scenario.settings)
+            situation = situation_of(examine(calibration))
+    except CalibrationError:
+        return Row(scenario.name, seed, None, float("nan"), None)
+    pixels = np.concatenate([view.pixels for view in calibration.detections.views])
     pixels = pixels[:: max(1, len(pixels) // PLACES)]
-    grouped = _grouped(found, world)
-    return Row(
-        scenario=scenario.name,
-        seed=seed,
-        grade=str(found.verdict.grade),
-        cause=found.verdict.cause,
-        right=found.verdict.grade in scenario.grades
-        and found.verdict.cause in scenario.causes
-        and (grouped is None or (scenario.groups and grouped[1] == 0)),
-        true_px=true_error(world, pixels, found.calibration.camera.unproject(pixels)),
-        predicted_px=found.situation.error_px,
-        noise_px=noise,
-        grouped=grouped,
-        told=str(found.verdict),
-    )
+    true_px = true_error(world, pixels, calibration.camera.unproject(pixels))
+    return Row(scenario.name, seed, asdict(situation), true_px, _grouped(situation, world))
 
 
-def _grouped(found: Evaluation, world: World) -> tuple[int, int] | None:
+def _grouped(found: Situation, world: World) -> tuple[int, int] | None:
     """How many photographs were put into groups, and how many of them into the wrong one."""
-    if not found.situation.groups:
+    if not found.groups:
         return None
-    true = {
-        photograph.image: group for photograph, group in zip(world.photographs, world.groups, strict=True)
-    }
-    named = [(true[image], i) for i, images in enumerate(found.situation.groups) for image in images]
+    true = {photograph.image: group for photograph, group in zip(world.photographs, world.groups, strict=True)}
+    named = [(true[image], i) for i, images in enumerate(found.groups) for image in images]
     as_named = sum(group == i for group, i in named)
     return len(named), min(as_named, len(named) - as_named)
-
-
-def breach(row: Row) -> str:
-    """Which of the rules that hold everywhere a row breaks; empty for none."""
-    if row.grade in (Grade.GOOD, Grade.REGION) and (
-        row.true_px > FAR_PX or row.true_px > OFTEN * row.predicted_px
-    ):
-        return "called good"
-    if row.grade == Grade.NO and row.true_px < min(NEAR_PX, row.noise_px):
-        return "thrown away"
-    return ""
 
 
 def page(rows: Sequence[Row]) -> str:
@@ -144,11 +142,11 @@ def page(rows: Sequence[Row]) -> str:
     of = {scenario.name: [row for row in rows if row.scenario == scenario.name] for scenario in SCENARIOS}
     of = {name: found for name, found in of.items() if found}
     lines = ["# The verdict, measured", "", *_summary(rows, of), "", *_lines(of), ""]
-    wrong = [row for row in rows if not row.right or breach(row)]
+    wrong = [row for row in rows if not row.right or row.breach]
     lines += ["## What was wrong", ""]
     lines += [
         f"- {row.scenario}, seed {row.seed}: {row.grade}{f' ({row.cause})' if row.cause else ''}, off by {row.true_px:.2f} px, "
-        f"predicted {row.predicted_px:.2f}{f'; {breach(row)}' if breach(row) else ''}"
+        f"predicted {row.predicted_px:.2f}{f'; {row.breach}' if row.breach else ''}"
         for row in wrong
     ] or ["Nothing."]
     return "\n".join(lines) + "\n"
@@ -159,13 +157,13 @@ def _summary(rows: Sequence[Row], of: dict[str, list[Row]]) -> list[str]:
     seeds = max(len(found) for found in of.values())
     known = [row for row in rows if np.isfinite(row.true_px) and np.isfinite(row.predicted_px)]
     ratio = np.array([row.predicted_px / row.true_px for row in known])
-    breaches = Counter(breach(row) for row in rows)
+    breaches = Counter(row.breach for row in rows)
     agreeing = [
-        row for row in rows if _scenario(row).recipe.cameras[0] == "one" and not _scenario(row).recipe.shutter
+        row for row in rows if row.of.recipe.cameras[0] == "one" and not row.of.recipe.shutter
     ]
     alarms = sum(row.cause == "photographs" for row in agreeing)
     differing = [
-        row for row in rows if "photographs" in _scenario(row).causes and len(_scenario(row).causes) == 1
+        row for row in rows if "photographs" in row.of.causes and len(row.of.causes) == 1
     ]
     found = sum(row.cause == "photographs" for row in differing)
     named = [row for row in rows if row.grouped is not None]
@@ -209,23 +207,19 @@ def _lines(of: dict[str, list[Row]]) -> list[str]:
         "|---|---|---|---|---|---|",
     ]
     for name, rows in of.items():
-        scenario = _scenario(rows[0])
+        scenario = rows[0].of
         said = Counter(
             f"{row.grade}{f' ({row.cause})' if row.cause not in ('', REFUSED) else ''}" for row in rows
         )
         told = ", ".join(f"{what} {count}" for what, count in said.most_common())
-        due = f"{', '.join(dict.fromkeys(scenario.grades))}; {', '.join(cause or '-' for cause in scenario.causes)}"
-        true, predicted = (
+        due = f"{', '.join(dict.fromkeys(scenario.grades))}; {', '.join(cause or '-' for cause in
+        scenario.causes)}" true, predicted = (
             _median([getattr(row, which) for row in rows]) for which in ("true_px", "predicted_px")
         )
         lines.append(
             f"| {name} | {sum(row.right for row in rows)} of {len(rows)} | {told} | {true} | {predicted} | {due} |"
         )
     return lines
-
-
-def _scenario(row: Row) -> Scenario:
-    return next(scenario for scenario in SCENARIOS if scenario.name == row.scenario)
 
 
 def _share(count: int, of: int) -> str:
@@ -240,8 +234,16 @@ def _median(values: Iterable[float]) -> str:
 def _read(path: Path) -> list[Row]:
     if not path.exists():
         return []
-    rows = [Row(**json.loads(line)) for line in path.read_text().splitlines()]
-    return [row._replace(grouped=tuple(row.grouped) if row.grouped else None) for row in rows]  # type: ignore[arg-type]
+    return [_row(json.loads(line)) for line in path.read_text().splitlines()]
+
+
+def _row(written: dict[str, Any]) -> Row:
+    """A row as it was before it was written: JSON has lists for tuples."""
+    facts = written["facts"]
+    if facts:
+        facts["groups"] = tuple(tuple(group) for group in facts["groups"])
+        facts |= {name: tuple(tuple(pair) for pair in facts[name]) for name in ("suspects", "precious")}
+    return Row(**{**written, "facts": facts, "grouped": written["grouped"] and tuple(written["grouped"])})
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -269,7 +271,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 file.flush()
                 row = rows[-1]
                 print(
-                    f"{'' if row.right else 'WRONG '}{breach(row)} {row.scenario} {seed}: {row.told}",
+                    f"{'' if row.right else 'WRONG '}{row.breach} {row.scenario} {seed}: {row.verdict or REFUSED}",
                     file=sys.stderr,
                 )
     names = {scenario.name for scenario in wanted}

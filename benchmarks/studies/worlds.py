@@ -1,8 +1,9 @@
-"""Made photographs whose truth is known: a camera that is not this project's own, a board as boards are, and what can go wrong.
+"""Made photographs whose truth is known: a camera that is not this project's own, a board as boards are, and
+what can go wrong.
 
-A `World` is made from a `Recipe` and a seed: poses are drawn for a board (standing.py), the board is what it really is
-(boards.py), each photograph has its own camera where something moved (`CAMERAS`), noise is white, alike within a view, or
-heavy-tailed, and a detector makes its mistakes (`DETECTORS`).
+A `World` is made from a `Recipe` and a seed: poses are drawn for a board (standing.py), the board is what it
+really is (boards.py), each photograph has its own camera where something moved (`CAMERAS`), noise is white,
+alike within a view, or heavy-tailed, and a detector makes its mistakes (`DETECTORS`).
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy import ndarray
+
 from benchmarks.studies.boards import grid, shaped, smooth_height
 from benchmarks.studies.projectors import Projector
 from benchmarks.studies.standing import Standing, stand
-from numpy import ndarray
 
 __all__ = ["CAMERAS", "DETECTORS", "Photograph", "Recipe", "World", "made", "true_error"]
 
@@ -98,7 +100,8 @@ def made(recipe: Recipe, seed: int) -> World:
 
 
 def true_error(world: World, pixels: ndarray, rays: ndarray) -> float:
-    """How far off an estimated camera is: rms over pixels, a rotation fitted out, against the true camera of every photograph.
+    """How far off an estimated camera is: rms over pixels, a rotation fitted out, against the true camera of
+    every photograph.
 
     Args:
         pixels: (n,2) of the estimated camera's image.

@@ -20,7 +20,8 @@ Examples:
   $ orthoscope evaluate camera/calibration.json --on other_photos/
   off by     0.158 px per corner, the camera fixed, poses fitted
   photos     5 used, 0 set aside; 270 corners
-  board      the one of the calibration: 0.158 px with the shape found there, 0.241 without; the shape found there is used
+  board      the one of the calibration: 0.158 px with the shape found there, 0.241 without; the shape found
+  there is used
 
 \b
 Whether other photographs show the board of the calibration is found out by its shape;

@@ -13,12 +13,13 @@ __all__ = ["export"]
 EXAMPLE = """\b
 Example:
   $ orthoscope export camera/calibration.json --to opencv -o camera.yaml
-  lens       brown instead of the free lens: 0.024 px apart on average where corners were seen, 0.16 px at most
-  wrote      camera.yaml
+  lens       brown instead of the free lens: 0.024 px apart on average where corners were seen, 0.16 px at
+  most wrote      camera.yaml
 
 \b
-A formula is written exactly or not at all. opencv, ros and kalibr have no free lens: the nearest formula that they have is written, and
-the line above says what it costs. `orthoscope calibrate --export TOOL` chooses that formula by held-out error.
+A formula is written exactly or not at all. opencv, ros and kalibr have no free lens: the nearest formula that
+they have is written, and the line above says what it costs. `orthoscope calibrate --export TOOL` chooses that
+formula by held-out error.
 """
 
 

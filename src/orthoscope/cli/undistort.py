@@ -19,7 +19,8 @@ Examples:
   wrote      straight/clip.mp4, 250 frames, and straight/camera.json, its camera
 
 \b
-PHOTOS are files, folders and globs of photographs; and video files (mp4, m4v, mov, mkv, avi), each named by itself. Sound is not kept.
+PHOTOS are files, folders and globs of photographs; and video files (mp4, m4v, mov, mkv, avi), each named by
+itself. Sound is not kept.
 """
 
 

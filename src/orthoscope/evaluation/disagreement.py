@@ -1,22 +1,24 @@
 """Do the photographs agree on one camera?  A test of what each of them would have liked K to be.
 
-A lens that zooms or focuses between photographs, a stabiliser, a rolling shutter, two cameras in one folder: in each view
-the residuals then ask for another K.  With the fit linearised (fitting/linearised.py), C_j what a few changes of K do to
-the residuals of view j, its pose fitted, B_j what its own say in the fit explains, s2 the noise:
+A lens that zooms or focuses between photographs, a stabiliser, a rolling shutter, two cameras in one folder:
+in each view the residuals then ask for another K.  With the fit linearised (fitting/linearised.py), C_j what
+a few changes of K do to the residuals of view j, its pose fitted, B_j what its own say in the fit explains,
+s2 the noise:
 
     T_j = C_j'(I - B_j) C_j,    s_j = C_j'e_j,    the view's wish  kappa_j = -T_j^-1 s_j,
     F = sum s_j'T_j^+ s_j / (s2 sum rank T_j)
 
-F is far above 1 on photographs that agree, since the errors of one view are alike (boards bend from view to view, and what
-bends is of the second order).  So it is divided by how far the views' residuals follow second-order patterns of the board
-that no change of K makes: tau, the same ratio for these patterns, C_j projected out.  F2 = F / max(1, tau) has Fisher's
-distribution where views agree but bend.  The fit must be the one with every corner free and a free lens: else the target's
-shape, which each view sees from another side, is taken for a camera that changes.
+F is far above 1 on photographs that agree, since the errors of one view are alike (boards bend from view to
+view, and what bends is of the second order).  So it is divided by how far the views' residuals follow second-
+order patterns of the board that no change of K makes: tau, the same ratio for these patterns, C_j projected
+out.  F2 = F / max(1, tau) has Fisher's distribution where views agree but bend.  The fit must be the one with
+every corner free and a free lens: else the target's shape, which each view sees from another side, is taken
+for a camera that changes.
 
-How much the camera changes is the spread of the wishes without their noise: kappa_j ~ N(0, S), S by expectation
-maximisation, and the rms movement of the image that S makes, a rotation fitted out.  A shutter that reads row after row
-shears the image, which is no change of K, and is tested in the same way.  The focal length alone and the principal point
-alone are tested too: one wish out of many stands out more by itself.
+How much the camera changes is the spread of the wishes without their noise: kappa_j ~ N(0, S), S by
+expectation maximisation, and the rms movement of the image that S makes, a rotation fitted out.  A shutter
+that reads row after row shears the image, which is no change of K, and is tested in the same way.  The focal
+length alone and the principal point alone are tested too: one wish out of many stands out more by itself.
 """
 
 from __future__ import annotations
@@ -87,7 +89,8 @@ class Disagreement:
         f2, p_value: of the test; NaN where the views do not suffice for one.
         certain: whether they surely do not.
         kind: what changes most between them: `zoom`, `centre`, `shutter`; empty where they agree.
-        by_px: how far the image moves from photograph to photograph, rms over the seen pixels and the photographs, after a rotation.
+        by_px: how far the image moves from photograph to photograph, rms over the seen pixels and the
+            photographs, after a rotation.
         focal: standard deviation of the focal length over photographs, as a share of it.
         centre_px: standard deviation of the principal point, pixels.
         wishes: of scale, cx and cy.
@@ -142,7 +145,8 @@ def changes_of(fit: Linearised, more: tuple[str, ...] = ()) -> tuple[tuple[str, 
     """The changes of the camera that a view may wish for, as steps of a fit's unknowns, and their names.
 
     Args:
-        more: names of coefficients beside scale, cx and cy, each with a step of its own size, where the fit has them.
+        more: names of coefficients beside scale, cx and cy, each with a step of its own size, where the fit
+            has them.
     """
     K, width = fit.camera.intrinsics, fit.camera.image_size[0]
     parts = [name.split("=") for name in fit.names]

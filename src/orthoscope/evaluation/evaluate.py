@@ -1,8 +1,8 @@
 """How good a calibration is: its numbers, and the verdict that is made of them.
 
-The error that counts is that of the camera (camera_error.py). Held-out error is the check on it, and cannot see what all
-photographs share: a target or a formula that is wrong, which the misfit tests find, and photographs that do not agree on
-one camera.
+The error that counts is that of the camera (camera_error.py). Held-out error is the check on it, and cannot
+see what all photographs share: a target or a formula that is wrong, which the misfit tests find, and
+photographs that do not agree on one camera.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
-__all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on"]
+__all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on", "examine"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,8 @@ class Evaluation:
     Args:
         calibration: that was evaluated.
         rms_px, median_px, largest_px: of |residual| over the corners that it was made from.
-        held_out_rms_px: over all corners, each by a camera that did not use its photograph; NaN where there were too few.
+        held_out_rms_px: over all corners, each by a camera that did not use its photograph; NaN where there
+            were too few.
         held_out_error_px: its standard error over photographs.
         nce: of held-out photographs where there are any, else of those that were used.
         misfit: of the target and of the lens (misfit.py).
@@ -82,7 +83,8 @@ class Evaluation:
     situation: Situation = NOTHING_KNOWN
 
     def trusted(self, pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
-        """Which places of the image lie where the camera may be used; none where nothing tells how far off it is.
+        """Which places of the image lie where the camera may be used; none where nothing tells how far off it
+        is.
 
         Args:
             pixels: (n,2) of the camera's image.
@@ -147,10 +149,8 @@ def evaluate(
         ViewError(view.image, len(view.ids), rms(e), rms(e_unseen))
         for view, e, e_unseen in zip(detections.views, residuals, unseen.residuals, strict=True)
     )
-    reference = reference_fit(calibration)
-    differ, groups = _agreement(reference, detections)
-    misfits = misfit(calibration)
-    situation = situation_of(Findings(calibration, views, misfits, reference, differ, groups))
+    found = examine(calibration, views)
+    situation = situation_of(found)
     return Evaluation(
         calibration=calibration,
         rms_px=rms(np.concatenate(residuals)),
@@ -159,18 +159,33 @@ def evaluate(
         held_out_rms_px=unseen.rms_px,
         held_out_error_px=unseen.standard_error_px,
         nce=_nce(calibration, unseen),
-        misfit=misfits,
+        misfit=found.misfit,
         coverage=share_covered(calibration),
         views=views,
         held_out_residuals=unseen.residuals,
         suspects=situation.suspects,
         warnings=calibration.assumptions,
         verdict=verdict_on(situation),
-        error=reference.error if reference else None,
-        disagreement=differ,
-        groups=groups,
+        error=found.reference.error if found.reference else None,
+        disagreement=found.disagreement,
+        groups=found.groups,
         situation=situation,
     )
+
+
+def examine(calibration: Calibration, views: tuple[ViewError, ...] | None = None) -> Findings:
+    """What tests find out about a calibration; no photograph is held out.
+
+    Args:
+        views: what each photograph's error is, where that is known; found out where not.
+    """
+    if views is None:
+        nothing = float("nan")
+        pairs = zip(calibration.detections.views, calibration.residuals(), strict=True)
+        views = tuple(ViewError(view.image, len(view.ids), rms(e), nothing) for view, e in pairs)
+    reference = reference_fit(calibration)
+    differ, groups = _agreement(reference, calibration.detections)
+    return Findings(calibration, views, misfit(calibration), reference, differ, groups)
 
 
 def _agreement(reference: ReferenceFit | None, detections: Detections) -> tuple[Disagreement, Groups | None]:

@@ -1,18 +1,21 @@
 """Which photographs one camera took and which the other: the groups of views that do not agree.
 
-What each view would have liked the camera to be (disagreement.py) is a quadratic, q_j(k) = 2 k's_j + k'T_j k, of a few
-changes k of the camera.  Two cameras are two changes, and each view belongs to the one at which its quadratic is lower.
-Two questions, and either makes two groups of photographs:
+What each view would have liked the camera to be (disagreement.py) is a quadratic, q_j(k) = 2 k's_j + k'T_j k,
+of a few changes k of the camera.  Two cameras are two changes, and each view belongs to the one at which its
+quadratic is lower. Two questions, and either makes two groups of photographs:
 
-1. *Is it two values, or a spread?*  exp(-q_j / 2) is the likelihood of a view.  Two changes, each view with one of them, are
-   compared with changes that are normally distributed (a lens that focuses anew for every photograph): groups are named where
-   two values are TWICE_AS_LIKELY.  A view whose likelihoods differ too little to tell belongs to neither.
-2. *Do two cameras foresee the photographs far better?*  Groupings of the linear step are refined by a fit for each group,
-   each view going to the camera that sees it with less error (by leave-one-out in its own group), until nothing changes.
-   Photographs are of two cameras where these foresee them with less than APART of the error of one for all.
+1. *Is it two values, or a spread?*  exp(-q_j / 2) is the likelihood of a view.  Two changes, each view with
+   one of them, are compared with changes that are normally distributed (a lens that focuses anew for every
+   photograph): groups are named where two values are TWICE_AS_LIKELY.  A view whose likelihoods differ too
+   little to tell belongs to neither.
+2. *Do two cameras foresee the photographs far better?*  Groupings of the linear step are refined by a fit for
+   each group, each view going to the camera that sees it with less error (by leave-one-out in its own group),
+   until nothing changes. Photographs are of two cameras where these foresee them with less than APART of the
+   error of one for all.
 
 The first finds what is small beside the noise, the second what is too large to be linear.
-S. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28(2), 1982 (k-means, here on quadratics).
+S. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28(2), 1982 (k-means, here on
+quadratics).
 """
 
 from __future__ import annotations
@@ -29,7 +32,7 @@ from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
-from orthoscope.methods.fccm import fccm
+from orthoscope.methods.fccm import fit_flat
 from orthoscope.models.lenses import FREE
 from orthoscope.targets.detections import Detections
 
@@ -38,7 +41,8 @@ __all__ = ["Groups", "two_groups"]
 APART = 0.7  # of the error of one camera for all
 TWICE_AS_LIKELY = 2.5  # logarithm of the likelihood ratio: two values against a spread
 CERTAINLY = 0.95  # a view with less than this for either group is in none
-SMALL = 0.3  # of the squared residuals: what the linear step must explain of them before fits are worth their time
+# of the squared residuals: what the linear step must explain of them before fits are worth their time
+SMALL = 0.3
 FEWEST = 4  # views of a group: with fewer, none can be left out
 STARTS = 60
 ROUNDS = 6  # of refinement
@@ -114,7 +118,9 @@ def _quadratics(fit: Linearised, noise: float, more: tuple[str, ...] = ()) -> _Q
 
 
 def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
-    """Groupings by k-means, and the best cut of each wish as it is: the sum of the quadratics, who is in the second; best first."""
+    """Groupings by k-means, and the best cut of each wish as it is: the sum of the quadratics, who is in the
+    second; best first.
+    """
     views = len(say.score)
     faint = 1e-9 * np.eye(say.score.shape[1]) * np.trace(say.told.mean(0))
     wishes = -np.linalg.solve(say.told + faint, say.score[..., None])[..., 0]
@@ -182,7 +188,9 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
 def _refined(
     detections: Detections, second: Bool[ndarray, " m"], *, base: str
 ) -> tuple[float, Bool[ndarray, " m"]] | None:
-    """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no camera."""
+    """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no
+    camera.
+    """
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
     for _ in range(ROUNDS):
@@ -213,7 +221,7 @@ def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndar
 
 
 def _fit(detections: Detections, *, base: str) -> StepOneFit:
-    return fit_step_one(fccm(detections, lens=base), target="free", through=FREE)
+    return fit_step_one(fit_flat(detections, lens=base), target="free", through=FREE)
 
 
 def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:

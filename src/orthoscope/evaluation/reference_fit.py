@@ -1,8 +1,9 @@
-"""The richest fit of a calibration's own photographs: what its camera is compared with, and what its views are asked by.
+"""The richest fit of a calibration's own photographs: what its camera is compared with, and what its views
+are asked by.
 
-Every corner free and a free lens over the same base: whatever the calibration took for granted of target and lens is open
-here. From it come the test of whether the photographs agree (disagreement.py), what leaving each of them out does, and, beside
-the calibration's own fit, how far off its camera is (camera_error.py).
+Every corner free and a free lens over the same base: whatever the calibration took for granted of target and
+lens is open here. From it come the test of whether the photographs agree (disagreement.py), what leaving each
+of them out does, and, beside the calibration's own fit, how far off its camera is (camera_error.py).
 """
 
 from __future__ import annotations
@@ -17,10 +18,9 @@ from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.scatter import Scatter, scatter_of
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.methods.decoupled.candidates import PAIRS, Candidates, Model
 from orthoscope.methods.decoupled.step_one import FORMULA, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
-from orthoscope.methods.decoupled.step_two_linearised import PairsLeftOut
-from orthoscope.methods.fccm import fccm
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import FREE, lens_name
 
@@ -39,7 +39,7 @@ class ReferenceFit:
         base: the formula under its free lens.
         error: how far off the calibration's own camera is.
         own_left_out: (m,) squared error of each view, px^2, by the calibration's own model without it.
-        own_squares: (m,) the same with it.
+        own_squares: (m,) the same with it, as the calibration is.
     """
 
     known: Linearised
@@ -52,32 +52,34 @@ class ReferenceFit:
 
 def reference_fit(calibration: Calibration) -> ReferenceFit | None:
     """The richest fit of a calibration's photographs; None where they do not tell one."""
-    detections = calibration.detections
+    detections, points = calibration.detections, calibration.detections.target.points
     if len(detections.views) < FEWEST_VIEWS:
         return None
-    base = _base(calibration)
+    candidates = Candidates(detections, skew=bool(calibration.settings.get("skew", False)))
+    richest = Model(_base(calibration), "free", FREE)
     try:
-        flat = fccm(detections, lens=base, skew=bool(calibration.settings.get("skew", False)))
-        richest = fit_step_one(flat, target="free", through=FREE)
-        known = linearised(richest)
-        left_out = leave_one_out(known)
-        of_richest = scatter_of(known, left_out, detections.target.points)
-        own, own_left_out, own_squares = _own(calibration, flat, known, left_out, of_richest)
+        known, left_out = candidates.linearised(richest), candidates.left_out(richest)
+        of_richest = scatter_of(known, left_out, points)
+        own, without, within = _own(calibration, candidates, richest)
     except (CalibrationError, np.linalg.LinAlgError):
         return None
     seen = seen_places(np.concatenate([view.pixels for view in detections.views]))
     distance = float(np.median([np.linalg.norm(pose.translation) for pose in calibration.camera_from_target]))
     error = predicted_error(
-        own or of_richest, seen, distance=distance, richest=None if own is of_richest else of_richest
+        own or of_richest, seen, distance=distance, richest=None if own is None else of_richest
     )
-    if own is None:  # its unknowns are none of step 1's: what separates it from the richest fit is its bias
-        apart = rms_difference(calibration.camera, richest.estimate.camera, seen)
+    if own is None and not _is(
+        calibration, richest
+    ):  # nothing is known of its scatter: what is apart is its bias
+        apart = rms_difference(calibration.camera, known.camera, seen)
         error = replace(error, seen_px=float(np.hypot(error.seen_px, apart)), bias_px=apart)
-    return ReferenceFit(known, left_out, base, error, own_left_out, own_squares)
+    return ReferenceFit(known, left_out, richest.base, error, without, within)
 
 
 def _base(calibration: Calibration) -> str:
-    """The formula to put the free lens on: the calibration's own base, or its formula with all its coefficients."""
+    """The formula to put the free lens on: the calibration's own base, or its formula with all its
+    coefficients.
+    """
     if base := calibration.settings.get("base"):
         return str(base)
     lens = calibration.camera.lens
@@ -86,28 +88,29 @@ def _base(calibration: Calibration) -> str:
 
 
 def _own(
-    calibration: Calibration, flat: Calibration, known: Linearised, left_out: LeaveOneOut, of_richest: Scatter
+    calibration: Calibration, candidates: Candidates, richest: Model
 ) -> tuple[Scatter | None, Float[ndarray, " m"], Float[ndarray, " m"]]:
-    """Scatter of the calibration's own camera, and squares of its views without and with them."""
-    settings, points = calibration.settings, calibration.detections.target.points
-    if calibration.method == "decoupled":
-        through, formula = settings["through"], settings["lens"]
-        joint = formula == (FREE if through == FREE else settings["base"])
-        if joint and settings["target"] == "free" and through == FREE:
-            return of_richest, left_out.squares, (known.errors**2).sum(1)
-        fit = fit_step_one(flat, target=settings["target"], through=through)
-        mine = linearised(fit)
-        without = leave_one_out(mine)
-        if joint:
-            return scatter_of(mine, without, points), without.squares, (mine.errors**2).sum(1)
-        pairs = PairsLeftOut(fit, mine, without, calibration.camera, calibration.uncertainty.names)
-        return pairs.scatter(), pairs.squares, _squares(calibration)
+    """Scatter of the calibration's own camera where it is not the richest fit's or not known, and the squares
+    of its views without and with them.
+    """
+    within = np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
+    if calibration.method == "decoupled" and not _is(calibration, richest):
+        model = _model(calibration)
+        without = candidates.contender(model).squares
+        return candidates.scatter(model), without, within
     if calibration.method == "fccm":
         mine = linearised(fit_step_one(calibration, target="flat", through=FORMULA))
-        without = leave_one_out(mine)
-        return scatter_of(mine, without, points), without.squares, (mine.errors**2).sum(1)
-    return None, left_out.squares, _squares(calibration)
+        left_out = leave_one_out(mine)
+        return scatter_of(mine, left_out, calibration.detections.target.points), left_out.squares, within
+    return None, candidates.left_out(richest).squares, within
 
 
-def _squares(calibration: Calibration) -> Float[ndarray, " m"]:
-    return np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
+def _model(calibration: Calibration) -> Model:
+    """What a calibration of the default method was made as."""
+    settings = calibration.settings
+    formula = settings["lens"] if settings["fit"] == PAIRS else None
+    return Model(settings["base"], settings["target"], settings["through"], formula)
+
+
+def _is(calibration: Calibration, richest: Model) -> bool:
+    return calibration.method == "decoupled" and _model(calibration) == richest

@@ -1,9 +1,10 @@
-"""Is it the board that the camera was calibrated with?  The shape that was learnt goes with that board and with no other.
+"""Is it the board that the camera was calibrated with?  The shape that was learnt goes with that board and
+with no other.
 
-The camera is fixed and the pose of each new view is fitted twice, once to corners of the learnt shape and once to corners as
-they are said to be. Let a times the learnt shape be what the new views show: their squared residuals are a parabola in a, lower at 1
-than at 0 exactly where its minimum lies above one half. So the shape that leaves less is the nearer one, and how sure that is
-says the difference from view to view.
+The camera is fixed and the pose of each new view is fitted twice, once to corners of the learnt shape and
+once to corners as they are said to be. Let a times the learnt shape be what the new views show: their squared
+residuals are a parabola in a, lower at 1 than at 0 exactly where its minimum lies above one half. So the
+shape that leaves less is the nearer one, and how sure that is says the difference from view to view.
 """
 
 from __future__ import annotations

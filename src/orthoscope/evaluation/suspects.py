@@ -1,9 +1,10 @@
 """Which photographs do not belong, and which are precious.
 
-A photograph does not belong where its own residuals, after the fit that used it, are far above the typical photograph's. What
-they are like says why: white where its corners were found badly, smooth over the board where the board was bent in another way
-(which is no fault of its corners, and no reason to leave it out). Held-out error does not tell: it is large too where nothing
-else shows what the photograph shows, and such a photograph is *precious*; more like it are what the camera needs.
+A photograph does not belong where its own residuals, after the fit that used it, are far above the typical
+photograph's. What they are like says why: white where its corners were found badly, smooth over the board
+where the board was bent in another way (which is no fault of its corners, and no reason to leave it out).
+Held-out error does not tell: it is large too where nothing else shows what the photograph shows, and such a
+photograph is *precious*; more like it are what the camera needs.
 """
 
 from __future__ import annotations

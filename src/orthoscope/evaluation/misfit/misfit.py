@@ -23,10 +23,10 @@ fit took beyond that, as an estimated target shape or a free lens does, only mak
 tested with the image cells granted, A = (V, S, C), B = T, and the lens with the target granted, A = (V, S,
 T), B = C: a bent target makes a lens look bad and the other way round, so each is only blamed for what the
 other cannot explain. What a lens does besides its formula is smooth, and cells are steps: what they leave of
-a missing decentering would be blamed on the target. So C also holds smooth displacements of the image that any
-lens may make: radial ones up to the ninth power of the distance from the axis, decentering, thin prism.
-Displacements have three components, since what a dent does in the image turns with the
-view; what poses do as well (shift, turn, size of the whole target) has rank 0 by itself.
+a missing decentering would be blamed on the target. So C also holds smooth displacements of the image that
+any lens may make: radial ones up to the ninth power of the distance from the axis, decentering, thin prism.
+Displacements have three components, since what a dent does in the image turns with the view; what poses do as
+well (shift, turn, size of the whole target) has rank 0 by itself.
 
 **The vote of the views.**  In real photographs the errors of one view hang together (blur, light,
 refinement), and then F exceeds 1 without any misfit. Between views they still do not. So F is computed again
@@ -196,7 +196,8 @@ def _smooth_terms(camera: Camera, pixels: Float[ndarray, "n 2"]) -> Float[ndarra
     """What lenses do besides a formula, as displacements of the image: radial, decentering, thin prism.
 
     Args:
-        pixels: predicted. At detected ones a term less the same term of the formula would be the error itself.
+        pixels: predicted. At detected ones a term less the same term of the formula would be the error
+            itself.
     """
     frame = camera.lens_frame or camera.intrinsics
     x, y = ((pixels - [frame.cx, frame.cy]) / (0.5 * np.hypot(*camera.image_size))).T

@@ -1,7 +1,7 @@
 """What to do about it: for each cause the first that applies, as data.
 
-An advice that names an option says which, so that a test can ask whether the command line has it, and applies only where that is
-not what was done.  The last of each cause names none.
+An advice that names an option says which, so that a test can ask whether the command line has it, and applies
+only where that is not what was done.  The last of each cause names none.
 """
 
 from __future__ import annotations

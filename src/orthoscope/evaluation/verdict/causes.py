@@ -1,7 +1,8 @@
 """What can be wrong, worst first: one table.  A verdict names the first that holds, and no other.
 
-The order is that of what hides what: a formula that cannot follow the lens before the target, both before photographs that are
-merely too few; two cameras in one folder before everything that a single camera could have.
+The order is that of what hides what: a formula that cannot follow the lens before the target, both before
+photographs that are merely too few; two cameras in one folder before everything that a single camera could
+have.
 """
 
 from __future__ import annotations

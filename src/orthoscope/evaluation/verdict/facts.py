@@ -21,7 +21,8 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Findings", "corners_beyond", "distinct_views", "share_within", "situation_of"]
 
-COPIED_PX = 1.0  # in an image of 1000 pixels: views whose corners are apart by less (median) are the same photograph again
+# in an image of 1000 pixels: views whose corners are apart by less (median) are the same photograph again
+COPIED_PX = 1.0
 USUAL_WIDTH = 1000.0
 DISTINCT = 0.7  # of the views: with more copies among them, that they agree says nothing
 WILD = 12.0  # times the median residual: farther off than heavy tails reach
@@ -132,7 +133,9 @@ def _error(reference: ReferenceFit | None, disagreement: Disagreement, copies: f
 
 
 def _tilt(calibration: Calibration) -> float:
-    """The angle between the target's normal and the line of sight, degrees, in the photograph that has most but one."""
+    """The angle between the target's normal and the line of sight, degrees, in the photograph that has most
+    but one.
+    """
     points = calibration.detections.target.points
     tilts = []
     for pose, view in zip(calibration.camera_from_target, calibration.detections.views, strict=True):

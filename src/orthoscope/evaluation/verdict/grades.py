@@ -1,7 +1,8 @@
 """The four grades, and the figures that define them: one table, and nowhere else.
 
-A grade is given by how far off the camera is where corners were seen (error_px), and by the share of the frame over which it
-is off by FINE_PX at most.  What is known to be wrong (causes.py) can lower it, never raise it.
+A grade is given by how far off the camera is where corners were seen (error_px), and by the share of the
+frame over which it is off by FINE_PX at most.  What is known to be wrong (causes.py) can lower it, never
+raise it.
 """
 
 from __future__ import annotations

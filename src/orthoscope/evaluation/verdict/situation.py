@@ -19,7 +19,8 @@ class Situation:
     """The facts.
 
     Args:
-        method, lens, shape, base, through: what the calibration was made by, as it is called again; empty where it has no such setting.
+        method, lens, shape, base, through: what the calibration was made by, as it is called again; empty
+            where it has no such setting.
         views: photographs that were used.
         distinct: of these, those that are not near-copies of another.
         converged: whether the search for the camera came to an end.
@@ -41,8 +42,10 @@ class Situation:
         differ_focal: standard deviation of their focal lengths, a share.
         differ_centre_px: of their principal points.
         groups: images of each of two cameras; empty where there are none.
-        lens_px: what the lens does at the same places in every photograph and its formula does not; 0 where there is no such thing.
-        target_px, target_mm: how far the target's corners are from where they are said to be; 0 where there is no such thing.
+        lens_px: what the lens does at the same places in every photograph and its formula does not; 0 where
+            there is no such thing.
+        target_px, target_mm: how far the target's corners are from where they are said to be; 0 where there
+            is no such thing.
         suspects: images whose own corners fit badly, with what is wrong.
         precious: images that nothing else could replace, with the place that they alone show.
     """
