@@ -45,6 +45,8 @@ FAR_PX, OFTEN = (
     1.0,
     3.0,
 )  # a camera that is called good is off by no more, nor by so many times what was predicted
+PERFECT = ("perfect", "no distortion", "rational", "wide lens", "fisheye", "large board")
+BLAMES = ("photographs", "lens", "target", "views", "corners")
 NEAR_PX = 0.1  # a camera that is off by less, and by less than the noise, is not thrown away
 
 
@@ -131,7 +133,9 @@ def _grouped(found: Situation, world: World) -> tuple[int, int] | None:
     """How many photographs were put into groups, and how many of them into the wrong one."""
     if not found.groups:
         return None
-    true = {photograph.image: group for photograph, group in zip(world.photographs, world.groups, strict=True)}
+    true = {
+        photograph.image: group for photograph, group in zip(world.photographs, world.groups, strict=True)
+    }
     named = [(true[image], i) for i, images in enumerate(found.groups) for image in images]
     as_named = sum(group == i for group, i in named)
     return len(named), min(as_named, len(named) - as_named)
@@ -144,51 +148,55 @@ def page(rows: Sequence[Row]) -> str:
     lines = ["# The verdict, measured", "", *_summary(rows, of), "", *_lines(of), ""]
     wrong = [row for row in rows if not row.right or row.breach]
     lines += ["## What was wrong", ""]
-    lines += [
-        f"- {row.scenario}, seed {row.seed}: {row.grade}{f' ({row.cause})' if row.cause else ''}, off by {row.true_px:.2f} px, "
-        f"predicted {row.predicted_px:.2f}{f'; {row.breach}' if row.breach else ''}"
-        for row in wrong
-    ] or ["Nothing."]
-    return "\n".join(lines) + "\n"
+    wrong = [row for row in rows if not row.right or row.breach]
+    return (
+        "\n".join([*lines, "## What was wrong", "", *(map(_wrong, wrong) if wrong else ["Nothing."])]) + "\n"
+    )
+
+
+def _wrong(row: Row) -> str:
+    cause = f" ({row.cause})" if row.cause else ""
+    breach = f"; {row.breach}" if row.breach else ""
+    figures = f"off by {row.true_px:.2f} px, predicted {row.predicted_px:.2f}"
+    return f"- {row.scenario}, seed {row.seed}: {row.grade}{cause}, {figures}{breach}"
 
 
 def _summary(rows: Sequence[Row], of: dict[str, list[Row]]) -> list[str]:
     """What it is, and the figures over all scenarios."""
     seeds = max(len(found) for found in of.values())
-    known = [row for row in rows if np.isfinite(row.true_px) and np.isfinite(row.predicted_px)]
-    ratio = np.array([row.predicted_px / row.true_px for row in known])
+    ratio = np.array(
+        [row.predicted_px / row.true_px for row in rows if np.isfinite(row.predicted_px / row.true_px)]
+    )
     breaches = Counter(row.breach for row in rows)
-    agreeing = [
-        row for row in rows if row.of.recipe.cameras[0] == "one" and not row.of.recipe.shutter
-    ]
-    alarms = sum(row.cause == "photographs" for row in agreeing)
-    differing = [
-        row for row in rows if "photographs" in row.of.causes and len(row.of.causes) == 1
-    ]
-    found = sum(row.cause == "photographs" for row in differing)
-    named = [row for row in rows if row.grouped is not None]
-    perfect = [
-        row
-        for row in rows
-        if row.scenario.startswith(("perfect", "no distortion", "rational", "wide lens", "fisheye"))
-    ]
-    blamed = sum(row.cause in ("photographs", "lens", "target", "views", "corners") for row in perfect)
+    agreeing = [row for row in rows if row.of.recipe.cameras[0] == "one" and not row.of.recipe.shutter]
+    differing = [row for row in rows if row.of.causes == ("photographs",)]
+    named = [row.grouped for row in rows if row.grouped is not None]
+    perfect = [row for row in rows if row.scenario.startswith(PERFECT)]
+    figures = (
+        ("grade and cause right", _share([row.right for row in rows])),
+        (
+            "called good, though off by more than 1 px or three times what was predicted",
+            _of(breaches["called good"], rows),
+        ),
+        (
+            "thrown away, though off by less than 0.1 px and less than the noise",
+            _of(breaches["thrown away"], rows),
+        ),
+        ("predicted error over true error, geometric mean", f"{np.exp(np.log(ratio).mean()):.2f}"),
+        ("true error above twice the predicted one", _share(ratio < 0.5)),
+        ("photographs that agree, said not to", _share([row.cause == "photographs" for row in agreeing])),
+        ("photographs that do not agree, found", _share([row.cause == "photographs" for row in differing])),
+        ("groups named with every photograph right", _share([wrong == 0 for _, wrong in named])),
+        ("perfect photographs on which anything is blamed", _share([row.cause in BLAMES for row in perfect])),
+    )
     return [
-        f"Written by `python -m benchmarks.studies.truth_table`: {len(of)} scenarios, {seeds} seeds each, made by cameras that are not",
-        "this project's (`benchmarks/studies/projectors.py`), calibrated and evaluated as a user would. What the grades mean, and how",
-        "the error is predicted: [verdict.md](../verdict.md).",
+        f"Written by `python -m benchmarks.studies.truth_table`: {len(of)} scenarios, {seeds} seeds each, made by",
+        "cameras that are not this project's (`benchmarks/studies/projectors.py`), calibrated and evaluated as a",
+        "user would. What the grades mean, and how the error is predicted: [verdict.md](../verdict.md).",
         "",
         "| what | found |",
         "|---|---|",
-        f"| grade and cause right | {_share(sum(row.right for row in rows), len(rows))} |",
-        f"| called good, though off by more than 1 px or three times what was predicted | {_share(breaches['called good'], len(rows))} |",
-        f"| thrown away, though off by less than 0.1 px and less than the noise | {_share(breaches['thrown away'], len(rows))} |",
-        f"| predicted error over true error, geometric mean | {np.exp(np.log(ratio).mean()):.2f} |",
-        f"| true error above twice the predicted one | {_share(int((ratio < 0.5).sum()), len(ratio))} |",
-        f"| photographs that agree, said not to | {_share(alarms, len(agreeing))} |",
-        f"| photographs that do not agree, found | {_share(found, len(differing))} |",
-        f"| groups named with every photograph right | {_share(sum(row.grouped[1] == 0 for row in named if row.grouped), len(named))} |",
-        f"| perfect photographs on which anything is blamed | {_share(blamed, len(perfect))} |",
+        *(f"| {what} | {found} |" for what, found in figures),
         "",
         "| grade | means |",
         "|---|---|",
@@ -212,18 +220,20 @@ def _lines(of: dict[str, list[Row]]) -> list[str]:
             f"{row.grade}{f' ({row.cause})' if row.cause not in ('', REFUSED) else ''}" for row in rows
         )
         told = ", ".join(f"{what} {count}" for what, count in said.most_common())
-        due = f"{', '.join(dict.fromkeys(scenario.grades))}; {', '.join(cause or '-' for cause in
-        scenario.causes)}" true, predicted = (
-            _median([getattr(row, which) for row in rows]) for which in ("true_px", "predicted_px")
-        )
-        lines.append(
-            f"| {name} | {sum(row.right for row in rows)} of {len(rows)} | {told} | {true} | {predicted} | {due} |"
-        )
+        causes = ", ".join(cause or "-" for cause in dict.fromkeys(scenario.causes))
+        due = f"{', '.join(dict.fromkeys(scenario.grades))}; {causes}"
+        true, predicted = _median([row.true_px for row in rows]), _median([row.predicted_px for row in rows])
+        right = sum(row.right for row in rows)
+        lines.append(f"| {name} | {right} of {len(rows)} | {told} | {true} | {predicted} | {due} |")
     return lines
 
 
-def _share(count: int, of: int) -> str:
-    return f"{100.0 * count / max(of, 1):.1f} % ({count} of {of})"
+def _share(which: Sequence[bool] | np.ndarray) -> str:
+    return _of(int(np.sum(which)), which)
+
+
+def _of(count: int, all_of: Sequence[Any] | np.ndarray) -> str:
+    return f"{100.0 * count / max(len(all_of), 1):.1f} % ({count} of {len(all_of)})"
 
 
 def _median(values: Iterable[float]) -> str:
