@@ -45,6 +45,8 @@ FAR_PX, OFTEN = (
     1.0,
     3.0,
 )  # a camera that is called good is off by no more, nor by so many times what was predicted
+TOO_FAR = "though off by more than 1 px or three times what was predicted"
+NEAR = "though off by less than 0.1 px and less than the noise"
 PERFECT = ("perfect", "no distortion", "rational", "wide lens", "fisheye", "large board")
 BLAMES = ("photographs", "lens", "target", "views", "corners")
 NEAR_PX = 0.1  # a camera that is off by less, and by less than the noise, is not thrown away
@@ -145,13 +147,9 @@ def page(rows: Sequence[Row]) -> str:
     """The page that says all of it."""
     of = {scenario.name: [row for row in rows if row.scenario == scenario.name] for scenario in SCENARIOS}
     of = {name: found for name, found in of.items() if found}
-    lines = ["# The verdict, measured", "", *_summary(rows, of), "", *_lines(of), ""]
-    wrong = [row for row in rows if not row.right or row.breach]
-    lines += ["## What was wrong", ""]
-    wrong = [row for row in rows if not row.right or row.breach]
-    return (
-        "\n".join([*lines, "## What was wrong", "", *(map(_wrong, wrong) if wrong else ["Nothing."])]) + "\n"
-    )
+    lines = ["# The verdict, measured", "", *_summary(rows, of), "", *_lines(of), "", "## What was wrong", ""]
+    wrong = [_wrong(row) for row in rows if not row.right or row.breach]
+    return "\n".join([*lines, *(wrong or ["Nothing."])]) + "\n"
 
 
 def _wrong(row: Row) -> str:
@@ -164,9 +162,8 @@ def _wrong(row: Row) -> str:
 def _summary(rows: Sequence[Row], of: dict[str, list[Row]]) -> list[str]:
     """What it is, and the figures over all scenarios."""
     seeds = max(len(found) for found in of.values())
-    ratio = np.array(
-        [row.predicted_px / row.true_px for row in rows if np.isfinite(row.predicted_px / row.true_px)]
-    )
+    ratio = np.array([row.predicted_px / row.true_px for row in rows])
+    ratio = ratio[np.isfinite(ratio)]
     breaches = Counter(row.breach for row in rows)
     agreeing = [row for row in rows if row.of.recipe.cameras[0] == "one" and not row.of.recipe.shutter]
     differing = [row for row in rows if row.of.causes == ("photographs",)]
@@ -174,14 +171,8 @@ def _summary(rows: Sequence[Row], of: dict[str, list[Row]]) -> list[str]:
     perfect = [row for row in rows if row.scenario.startswith(PERFECT)]
     figures = (
         ("grade and cause right", _share([row.right for row in rows])),
-        (
-            "called good, though off by more than 1 px or three times what was predicted",
-            _of(breaches["called good"], rows),
-        ),
-        (
-            "thrown away, though off by less than 0.1 px and less than the noise",
-            _of(breaches["thrown away"], rows),
-        ),
+        (f"called good, {TOO_FAR}", _of(breaches["called good"], rows)),
+        (f"thrown away, {NEAR}", _of(breaches["thrown away"], rows)),
         ("predicted error over true error, geometric mean", f"{np.exp(np.log(ratio).mean()):.2f}"),
         ("true error above twice the predicted one", _share(ratio < 0.5)),
         ("photographs that agree, said not to", _share([row.cause == "photographs" for row in agreeing])),
@@ -190,9 +181,9 @@ def _summary(rows: Sequence[Row], of: dict[str, list[Row]]) -> list[str]:
         ("perfect photographs on which anything is blamed", _share([row.cause in BLAMES for row in perfect])),
     )
     return [
-        f"Written by `python -m benchmarks.studies.truth_table`: {len(of)} scenarios, {seeds} seeds each, made by",
-        "cameras that are not this project's (`benchmarks/studies/projectors.py`), calibrated and evaluated as a",
-        "user would. What the grades mean, and how the error is predicted: [verdict.md](../verdict.md).",
+        f"Written by `python -m benchmarks.studies.truth_table`: {len(of)} scenarios, {seeds} seeds each, made",
+        "by cameras that are not this project's (`benchmarks/studies/projectors.py`), calibrated and evaluated",
+        "as a user would. What the grades mean, how the error is predicted: [verdict.md](../verdict.md).",
         "",
         "| what | found |",
         "|---|---|",
@@ -216,9 +207,7 @@ def _lines(of: dict[str, list[Row]]) -> list[str]:
     ]
     for name, rows in of.items():
         scenario = rows[0].of
-        said = Counter(
-            f"{row.grade}{f' ({row.cause})' if row.cause not in ('', REFUSED) else ''}" for row in rows
-        )
+        said = Counter(_said(row) for row in rows)
         told = ", ".join(f"{what} {count}" for what, count in said.most_common())
         causes = ", ".join(cause or "-" for cause in dict.fromkeys(scenario.causes))
         due = f"{', '.join(dict.fromkeys(scenario.grades))}; {causes}"
@@ -226,6 +215,10 @@ def _lines(of: dict[str, list[Row]]) -> list[str]:
         right = sum(row.right for row in rows)
         lines.append(f"| {name} | {right} of {len(rows)} | {told} | {true} | {predicted} | {due} |")
     return lines
+
+
+def _said(row: Row) -> str:
+    return f"{row.grade} ({row.cause})" if row.cause not in ("", REFUSED) else row.grade
 
 
 def _share(which: Sequence[bool] | np.ndarray) -> str:
@@ -280,10 +273,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 file.write(json.dumps(rows[-1]._asdict()) + "\n")
                 file.flush()
                 row = rows[-1]
-                print(
-                    f"{'' if row.right else 'WRONG '}{row.breach} {row.scenario} {seed}: {row.verdict or REFUSED}",
-                    file=sys.stderr,
-                )
+                right = "" if row.right else "WRONG "
+                print(f"{right}{row.breach} {row.scenario} {seed}: {row.verdict or REFUSED}", file=sys.stderr)
     names = {scenario.name for scenario in wanted}
     text = page([row for row in rows if row.scenario in names and row.seed < asked.seeds])
     if asked.only:

@@ -216,7 +216,7 @@ def _alike(
 
 
 def spread_of(score: Float[ndarray, "m c"], told: Float[ndarray, "m c c"]) -> Float[ndarray, "c c"]:
-    """Covariance S of changes kappa_j ~ N(0, S), of which view j tells exp(-kappa's_j - kappa'T_j kappa / 2)."""
+    """Covariance S of changes k_j ~ N(0, S), of which view j tells exp(-k's_j - k'T_j k / 2)."""
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).mean(0), 1e-300))
     heard, told = -score * scale, told * scale * scale[:, None]
     spread = np.eye(len(scale))

@@ -76,7 +76,7 @@ def _wrong(error: float, typical: float, smooth: float) -> str:
 
 
 def _smooth_share(known: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray, " m"]:
-    """Of each view the share of its squared residuals that patterns of order 2 and 3 over the board explain."""
+    """The share of each view's squared residuals that patterns of order 2 and 3 over the board explain."""
     patterns = np.concatenate(patterns_over_views(known, points, orders=(2, 3)), axis=2)
     explained = ((known.errors[:, None] @ patterns)[:, 0] ** 2).sum(1)
     return explained / np.maximum((known.errors**2).sum(1), 1e-300)

@@ -211,7 +211,7 @@ def _smooth_terms(camera: Camera, pixels: Float[ndarray, "n 2"]) -> Float[ndarra
 def _cell_residuals(
     found: Agreement, image: Block, smooth: Block, cells: Cells
 ) -> Float[ndarray, "rows columns 2"]:
-    """Of each cell: the residual that all its corners share, smooth terms included; NaN where there are none."""
+    """Of each cell the residual that its corners share, smooth terms included; NaN where there are none."""
     counts = np.bincount(image.group, minlength=image.groups)
     steps, terms = np.split(found.unknowns, [image.width])
     smoothly = [

@@ -111,7 +111,7 @@ ADVICE: tuple[Advice, ...] = (
     Advice(
         "open",
         lambda s: (
-            f"Take ten more with the target large in the frame and tilted by 30 to 45 degrees, some of them {s.place}."
+            f"Take ten more, the target large in the frame and tilted by 30 to 45 degrees, some {s.place}."
         ),
     ),
     Advice("views", lambda s: f"Look at {s.suspects[0][0]}, and take it again or leave it out."),
@@ -119,7 +119,7 @@ ADVICE: tuple[Advice, ...] = (
     Advice(
         "",
         lambda s: (
-            f"Nothing else shows the frame {s.precious[0][1]} as {s.precious[0][0]} does: take another like it."
+            f"Nothing shows the frame {s.precious[0][1]} as {s.precious[0][0]} does: take another like it."
         ),
         lambda s: bool(s.precious),
     ),

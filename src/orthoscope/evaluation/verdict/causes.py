@@ -66,7 +66,7 @@ KINDS = {
         f"the focal length changes between them by about {100 * s.differ_focal:.2g} % (zoom or focus)"
     ),
     "centre": lambda s: (
-        f"the image moves on the sensor between them by about {s.differ_centre_px:.2g} px (a stabiliser or cropping)"
+        f"the image moves on the sensor by about {s.differ_centre_px:.2g} px (a stabiliser or cropping)"
     ),
     "shutter": lambda s: "they were read row by row while camera or target moved (a rolling shutter)",
 }
@@ -107,7 +107,7 @@ CAUSES: tuple[Cause, ...] = (
         lambda s: s.beyond > 0,
         lambda s: Grade.NO,
         lambda s: (
-            f"the lens formula ends {s.fold:.0f} degrees from the axis, before {s.beyond} of the corners that were seen"
+            f"the lens formula ends {s.fold:.0f} degrees from the axis, before {s.beyond} of the corners"
         ),
     ),
     Cause(
@@ -122,7 +122,8 @@ CAUSES: tuple[Cause, ...] = (
         lambda s: s.lens_px > 0.0,
         _as_far_as_it_goes,
         lambda s: (
-            f"{_formula(s)} cannot follow this lens: at the same places of every photograph corners are off by {s.lens_px:.2g} px"
+            f"{_formula(s)} cannot follow this lens: at the same places of every photograph"
+            f" corners are off by {s.lens_px:.2g} px"
         ),
     ),
     Cause(

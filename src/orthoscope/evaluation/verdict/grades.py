@@ -36,7 +36,7 @@ class _Row(NamedTuple):
 GRADES: tuple[_Row, ...] = (
     _Row(
         Grade.GOOD,
-        f"off by {FINE_PX:g} px at most where corners were seen, and over {100 * WIDE:.0f} % of the frame or more",
+        f"off by {FINE_PX:g} px at most where corners were seen, and over {100 * WIDE:.0f} % of the frame",
         lambda s: s.error_px <= FINE_PX and s.share >= WIDE,
     ),
     _Row(

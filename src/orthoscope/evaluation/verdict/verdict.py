@@ -1,4 +1,4 @@
-"""The verdict in words: how far off the camera is and where that holds, at most one limit, then what to do."""
+"""The verdict in words: how far off the camera is, where that holds, at most one limit, what to do."""
 
 from __future__ import annotations
 
