@@ -242,7 +242,7 @@ SCENARIOS: tuple[Scenario, ...] = (
         _with(detectors=(("wild", 0.05),)),
         FLAT,
         (GOOD, REGION, USABLE, NO),
-        (*FEW, "views"),
+        (*FEW, "corners"),
     ),
     Scenario("one view found a row too low", _with(detectors=(("shifted", 1),))),
     Scenario("one view column by column", _with(detectors=(("transposed", 1),))),

@@ -97,8 +97,10 @@ class Row(NamedTuple):
     @property
     def right(self) -> bool:
         """Whether grade and cause are among those that the scenario names, and groups are as they were."""
-        grouped = self.grouped is None or (self.of.groups and self.grouped[1] == 0)
-        return self.grade in self.of.grades and self.cause in self.of.causes and grouped
+        due = self.grade in self.of.grades and self.cause in self.of.causes
+        if self.cause == "photographs" and self.grouped is not None:
+            return due and self.of.groups and self.grouped[1] == 0
+        return due
 
     @property
     def breach(self) -> str:
@@ -167,7 +169,7 @@ def _summary(rows: Sequence[Row], of: dict[str, list[Row]]) -> list[str]:
     breaches = Counter(row.breach for row in rows)
     agreeing = [row for row in rows if row.of.recipe.cameras[0] == "one" and not row.of.recipe.shutter]
     differing = [row for row in rows if row.of.causes == ("photographs",)]
-    named = [row.grouped for row in rows if row.grouped is not None]
+    named = [row.grouped for row in rows if row.grouped is not None and row.cause == "photographs"]
     perfect = [row for row in rows if row.scenario.startswith(PERFECT)]
     figures = (
         ("grade and cause right", _share([row.right for row in rows])),

@@ -21,6 +21,7 @@ FEW_VIEWS = 8
 LEVEL = 12.0  # degrees: photographs with less tilt are all frontal
 NOTICED = 0.5  # of the corners' noise: cameras that differ by less are as good as one
 NEGLIGIBLE_PX = 0.05
+STIFF = 0.5  # of the corners' noise: what a free lens may miss
 WILD = 0.005  # of the corners: chance makes hardly any
 SPARSE = 0.75  # of the frame's cells: with corners in fewer, it is corners that are missing
 NAMED = 3  # images that a sentence lists
@@ -54,6 +55,11 @@ def _matters(s: Situation) -> bool:
     return bool(s.disagree) and s.differ_px > max(NOTICED * s.noise_px, NEGLIGIBLE_PX)
 
 
+def _lens_is_missed(s: Situation) -> bool:
+    """A free lens is as stiff as its data made it, and misses a little of every lens by intent."""
+    return s.lens_px > (STIFF * s.noise_px if s.lens == "free" else 0.0)
+
+
 def _of_photographs(s: Situation) -> Grade:
     apart = 2.0 * s.differ_px if s.groups else s.differ_px
     if s.disagree == "shutter" and not s.groups:  # the camera is one; what the shutter did is in its error
@@ -83,7 +89,7 @@ def _photographs(s: Situation) -> str:
 
 def _open(s: Situation) -> bool:
     """Whether the camera is not known well enough, and not for lack of corners in some part of the frame."""
-    return s.error_px > FINE_PX or (s.share < WIDE and s.covered >= SPARSE)
+    return s.error_px > FINE_PX or (s.held < WIDE and s.covered >= SPARSE)
 
 
 def _as_far_as_known(s: Situation) -> Grade:
@@ -119,7 +125,7 @@ CAUSES: tuple[Cause, ...] = (
     Cause("photographs", _matters, _of_photographs, _photographs),
     Cause(
         "lens",
-        lambda s: s.lens_px > 0.0,
+        _lens_is_missed,
         _as_far_as_it_goes,
         lambda s: (
             f"{_formula(s)} cannot follow this lens: at the same places of every photograph"
@@ -131,12 +137,6 @@ CAUSES: tuple[Cause, ...] = (
         lambda s: s.target_px > 0.0,
         _as_far_as_it_goes,
         lambda s: f"{_target(s)}: in every photograph its corners are off by the same {s.target_mm:.2g} mm",
-    ),
-    Cause(
-        "solver",
-        lambda s: not s.converged,
-        lambda s: Grade.USABLE,
-        lambda s: "the search for the camera did not come to an end",
     ),
     Cause(
         "tilt",
@@ -156,6 +156,12 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause("open", _open, _as_far_as_known, lambda s: "these photographs do not tell it better"),
     Cause(
+        "solver",
+        lambda s: not s.converged,
+        lambda s: Grade.USABLE,
+        lambda s: "the search for the camera did not come to an end",
+    ),
+    Cause(
         "views",
         lambda s: bool(s.suspects),
         lambda s: Grade.GOOD,
@@ -163,7 +169,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "region",
-        lambda s: s.share < WIDE,
+        lambda s: s.held < WIDE,
         lambda s: Grade.REGION,
         lambda s: f"too few corners were seen {s.place}",
     ),

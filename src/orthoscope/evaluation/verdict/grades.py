@@ -1,8 +1,8 @@
 """The four grades, and the figures that define them: one table, and nowhere else.
 
 A grade is given by how far off the camera is where corners were seen (error_px), and by the share of the
-frame over which it is off by FINE_PX at most.  What is known to be wrong (causes.py) can lower it, never
-raise it.
+frame over which it is off by FINE_PX at most and corners were seen.  What is known to be wrong (causes.py)
+can lower it, never raise it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import NamedTuple
 
-from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
+from orthoscope.evaluation.verdict.situation import COARSE_PX, FINE_PX, Situation
 
 __all__ = ["GRADES", "WIDE", "Grade", "by_error", "lower"]
 
@@ -36,17 +36,18 @@ class _Row(NamedTuple):
 GRADES: tuple[_Row, ...] = (
     _Row(
         Grade.GOOD,
-        f"off by {FINE_PX:g} px at most where corners were seen, and over {100 * WIDE:.0f} % of the frame",
-        lambda s: s.error_px <= FINE_PX and s.share >= WIDE,
+        f"off by {FINE_PX:g} px at most where corners were seen, which is {100 * WIDE:.0f} % of the frame or more",
+        lambda s: s.error_px <= FINE_PX and s.held >= WIDE,
     ),
     _Row(
         Grade.REGION,
-        f"off by {FINE_PX:g} px at most where corners were seen; more elsewhere",
+        f"off by {FINE_PX:g} px at most where corners were seen, which is less of the frame",
         lambda s: s.error_px <= FINE_PX,
     ),
     _Row(
         Grade.USABLE,
-        "off by more, or something is wrong that is named, but by no more than 2 px of an image 1000 px wide",
+        f"off by more, or something is wrong that is named, but by no more than {COARSE_PX:g} px (of an image 1000 px"
+        " wide)",
         lambda s: s.error_px <= s.coarse_px,
     ),
     _Row(Grade.NO, "off by more than that, or nobody knows by how much", lambda s: True),

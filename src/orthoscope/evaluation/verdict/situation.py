@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FINE_PX", "NOTHING_KNOWN", "Situation", "coarse_px"]
+__all__ = ["COARSE_PX", "FINE_PX", "NOTHING_KNOWN", "Situation", "coarse_px"]
 
 FINE_PX = 0.5  # a camera that is off by no more serves everyone: corners are found to about that
-COARSE_PX = 2.0  # in an image of 1000 pixels: a camera that is off by more serves nobody
+COARSE_PX = 3.0  # in an image of 1000 pixels: a camera that is off by more serves nobody
 USUAL_WIDTH = 1000.0
 
 
@@ -27,7 +27,8 @@ class Situation:
         assumed: whether something was taken for granted that the photographs could not tell.
         error_px: how far off the camera is, rms over the seen part; NaN where nothing says.
         coarse_px: error above which it is of no use.
-        share: of the frame over which it is off by FINE_PX at most.
+        share: of the frame over which it is off by FINE_PX at most, by what is predicted; where no corners
+            were seen that rests on a formula which nothing has tested.
         covered: share of the frame's cells that corners were seen in.
         place: of the frame where corners are missing, in words.
         noise_px: of a found corner, per point.
@@ -81,6 +82,11 @@ class Situation:
     target_mm: float = 0.0
     suspects: tuple[tuple[str, str], ...] = ()
     precious: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def held(self) -> float:
+        """The share of the frame for which the camera answers: it is off by little, and corners were seen."""
+        return min(self.share, self.covered)
 
 
 NOTHING_KNOWN = Situation(error_px=float("nan"), share=0.0)

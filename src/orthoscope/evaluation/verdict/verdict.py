@@ -60,7 +60,7 @@ def _far(grade: Grade, s: Situation) -> str:
         return f"{HEADS[grade]}: nothing says how far off it is."
     told = f"{HEADS[grade]}: off by about {px(s.error_px)} px where corners were seen"
     if grade in (Grade.GOOD, Grade.REGION):
-        told += f", and by less than {FINE_PX:g} px over {_share(s.share)} of the frame"
+        told += f", and by less than {FINE_PX:g} px over {_share(s.held)} of the frame"
     return told + "."
 
 
