@@ -39,6 +39,8 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @options.lens
 @options.method
 @options.shape
+@options.base
+@options.fit
 @options.skew
 @options.loss
 @options.image_size
@@ -79,6 +81,8 @@ def calibrate_into(
     lens: str = "auto",
     method: str = "decoupled",
     shape: str | None = None,
+    base: str | None = None,
+    fit: str | None = None,
     skew: bool = False,
     loss: str | None = None,
     image_size: tuple[int, int] | None = None,
@@ -106,7 +110,15 @@ def calibrate_into(
     check_folder(out)
     lenses = _lenses_of(export)
     among = lenses if "among" in settings_of(method) else ()
-    given = {"lens": lens, "skew": skew, "target": shape, "loss": loss, "among": among or None}
+    given = {
+        "lens": lens,
+        "skew": skew,
+        "target": shape,
+        "base": base,
+        "fit": fit,
+        "loss": loss,
+        "among": among or None,
+    }
     given = {name: value for name, value in given.items() if value is not None}
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         detections, files = detections_from(

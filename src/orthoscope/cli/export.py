@@ -14,7 +14,8 @@ EXAMPLE = """\b
 Example:
   $ orthoscope export camera/calibration.json --to opencv -o camera.yaml
   lens       brown instead of the free lens: 0.024 px apart on average where corners were seen, 0.16 px at
-  most wrote      camera.yaml
+             most
+  wrote      camera.yaml
 
 \b
 A formula is written exactly or not at all. opencv, ros and kalibr have no free lens: the nearest formula that

@@ -10,8 +10,10 @@ import click
 
 __all__ = [
     "as_json",
+    "base",
     "calibration_file",
     "cluster",
+    "fit",
     "folds",
     "image_size",
     "jobs",
@@ -87,6 +89,22 @@ shape: Decorator = click.option(
     help=(
         "The target's shape, for decoupled: flat (as it is said to be), smooth (stretched, bent) or free"
         " (each corner by itself); by default what foresees best."
+    ),
+)
+base: Decorator = click.option(
+    "--base",
+    metavar="NAME",
+    help=(
+        "The formula under the free lens, for decoupled: brown, kannala_brandt, rational or another; by default"
+        " what foresees best of these three."
+    ),
+)
+fit: Decorator = click.option(
+    "--fit",
+    metavar="HOW",
+    help=(
+        "How decoupled fits a formula that --lens or --export asks for: joint (with poses and target) or pairs"
+        " (to what the free lens found); by default what foresees best."
     ),
 )
 skew: Decorator = click.option("--skew", is_flag=True, help="Let the pixel axes be oblique.")

@@ -16,9 +16,9 @@ __all__ = ["paper"]
 EXAMPLE = """\b
 Examples:
   $ orthoscope paper -o paper/
-  The paper's main claim, that MLDC is better than FCCM on test data, does not hold: it stands in 0 of 4
-  comparisons. wrote      paper/paper.html and 10 CSV files $ orthoscope paper --photos photos/ --target
-  chessboard:9x6:25mm -o paper/
+  The paper's main claim, that MLDC is better than FCCM on test data, does not hold: it stands in 0 of 4 comparisons.
+  wrote      paper/paper.html and 10 CSV files
+  $ orthoscope paper --photos photos/ --target chessboard:9x6:25mm -o paper/
 
 \b
 Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.

@@ -18,7 +18,13 @@ import numpy as np
 from orthoscope.fitting.board_order import in_one_order
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.identifiability import check_enough, check_known, told
-from orthoscope.fitting.initial_camera import Assumptions, StartingCameras, starts, suited_lens
+from orthoscope.fitting.initial_camera import (
+    Assumptions,
+    StartingCameras,
+    starts,
+    starts_elsewhere,
+    suited_lens,
+)
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
@@ -44,6 +50,7 @@ FIRM = 5
 ADEQUATE = 0.003
 LONG_WALK = 25  # steps; so many speak of a flat valley, and where corners are FEW there are often others
 FEW = 2000  # corners
+SQUARE = 1.1  # times longer than wide: cameras have no pixels that are less square
 
 
 def fccm(
@@ -106,6 +113,11 @@ def fit_flat(
     if sample is not observations:
         estimates = [_nearer(estimate, bases, free, cost) for estimate in estimates]
     solution = _best(estimates, observations, used, free, cost, options)
+    if len(used.views) > 2 and _is_doubtful(solution, bases):
+        more = [
+            _nearer(estimate, bases, free, cost) for estimate in starts_elsewhere(bases, kind, coefficients)
+        ]
+        solution = _best(more, observations, used, free, cost, options, best=solution)
     covariance = shared_covariance(solution.sums, 2 * used.corners)
     check_known(solution, free, covariance, used)
     uncertainty, left_open = told(free, covariance)
@@ -131,6 +143,15 @@ def _nearer(start: Estimate, bases: StartingCameras, free: tuple[str, ...], loss
     ).unknowns
 
 
+def _is_doubtful(solution: Solution[Estimate], bases: StartingCameras) -> bool:
+    """Whether there may be a better minimum elsewhere: pixels far from square, a principal point off the
+    frame, or one that Zhang's closed form would put there.
+    """
+    K, (width, height) = solution.unknowns.camera.intrinsics, bases.image_size
+    inside = 0.0 < K.cx < width and 0.0 < K.cy < height
+    return not inside or not 1.0 / SQUARE < K.fx / K.fy < SQUARE or bases.closed_form_is_off_the_frame
+
+
 def _best(
     estimates: list[Estimate],
     observations: Observations,
@@ -138,11 +159,13 @@ def _best(
     free: tuple[str, ...],
     loss: Loss,
     options: Options,
+    *,
+    best: Solution[Estimate] | None = None,
 ) -> Solution[Estimate]:
     """The joint refinement from the first start that ends well and without a long walk, or else the best of
-    all.
+    all; and of all of them, where one is known.
     """
-    best: Solution[Estimate] | None = None
+    known = best
     enough = used.corners * float(loss.cost(np.array((ADEQUATE * np.hypot(*used.image_size)) ** 2)))
     for estimate in estimates:
         problem = Reprojection(observations, used.target.points, estimate.camera, free)
@@ -155,7 +178,8 @@ def _best(
             solution = replace(scaled, steps=solution.steps + scaled.steps)
         if solution.status is not Status.NO_COST and (best is None or solution.cost < best.cost):
             best = solution
-        if best is not None and best.cost < enough and (solution.steps < LONG_WALK or used.corners > FEW):
+        ends_well = best is not None and best.cost < enough
+        if ends_well and known is None and (solution.steps < LONG_WALK or used.corners > FEW):
             break
     if best is None:
         raise CalibrationError(_no_start(estimates[0], observations, used))
