@@ -1,4 +1,5 @@
-"""Photographs that do not agree on one camera are found and named; boards that bend are not taken for them."""
+"""Photographs that do not agree on one camera are found and named; boards that bend are not taken for them.
+"""
 
 from __future__ import annotations
 
@@ -79,7 +80,9 @@ def test_how_far_cameras_are_apart_is_found():
 
 
 def test_wishes_are_the_changes_that_residuals_ask_for():
-    """Residuals that a change of K makes in one view are a wish for minus that change, and no other view has one."""
+    """Residuals that a change of K makes in one view are a wish for minus that change, and no other view has
+    one.
+    """
     detections = photographs_by(USUAL, seed=5)
     fit = richest_fit(detections)
     _, changes = changes_of(fit)

@@ -1,4 +1,6 @@
-"""The studies' worlds (benchmarks/studies) for tests: photographs made by cameras that are not this project's."""
+"""The studies' worlds (benchmarks/studies) for tests: photographs made by cameras that are not this
+project's.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The verdict: what it says is true of the figures, and no two things that it can say contradict each other."""
+"""The verdict: what it says is true of the figures, and no two things that it can say contradict each other.
+"""
 
 from __future__ import annotations
 
@@ -60,8 +61,8 @@ MADE_BY = {
         "shape": "smooth",
         "through": "free",
     },
-    "fccm": {"method": "fccm", "lens": "brown:k1,k2", "shape": "", "loss": "linear"},
-    "mldc": {"method": "mldc", "lens": "pfet", "shape": ""},
+    "fccm": {"method": "fccm", "lens": "brown:k1,k2", "shape": "flat", "loss": "linear"},
+    "mldc": {"method": "mldc", "lens": "pfet", "shape": "flat"},
 }
 
 
@@ -111,7 +112,9 @@ def test_no_advice_is_what_was_done():
 
 
 def test_no_advice_leads_in_a_circle():
-    """Whoever follows an option's advice is not sent back: with it in use, the same cause asks for something else."""
+    """Whoever follows an option's advice is not sent back: with it in use, the same cause asks for something
+    else.
+    """
     keys = {"--method": "method", "--lens": "lens", "--shape": "shape"}
     for s in ALL:
         seen = set()

@@ -74,7 +74,7 @@ ADVICE: tuple[Advice, ...] = (
     Advice(
         "target",
         _plain("Let its shape be found: --method decoupled."),
-        lambda s: not _of_default(s),
+        lambda s: not _of_default(s) and s.shape == "flat",
         (("--method", "decoupled"),),
     ),
     Advice(

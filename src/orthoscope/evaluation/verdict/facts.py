@@ -53,7 +53,7 @@ def situation_of(found: Findings) -> Situation:
     return Situation(
         method=calibration.method,
         lens=str(settings.get("lens", "")),
-        shape=str(settings.get("target", "")),
+        shape=calibration.target_shape.kind,
         base=str(settings.get("base", "")),
         through=str(settings.get("through", "")),
         loss=str(settings.get("loss", "")),

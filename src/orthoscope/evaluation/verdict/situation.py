@@ -19,7 +19,7 @@ class Situation:
     """The facts.
 
     Args:
-        method, lens, shape, base, through: what the calibration was made by, as it is called again; empty
+        method, lens, shape, base, through: what the calibration was made by (shape: what it came to), as it is called again; empty
             where it has no such setting.
         views: photographs that were used.
         distinct: of these, those that are not near-copies of another.
