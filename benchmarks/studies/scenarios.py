@@ -43,7 +43,7 @@ class Scenario:
     recipe: Recipe
     settings: Mapping[str, Any] = field(default_factory=dict)
     grades: tuple[str, ...] = ANY_GOOD
-    causes: tuple[str, ...] = ("", "region")
+    causes: tuple[str, ...] = ("", "region", "open")
     board: tuple[int, int, float] | None = None
     groups: bool = False
 
@@ -122,7 +122,9 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario("heavy-tailed corners", _with(tails=3.0)),
     # The photographs are too few or too much alike.
     Scenario("one view", _with(standing=_held(count=1)), grades=(NO,), causes=("few",)),
-    Scenario("two views", _with(standing=_held(count=2)), grades=(NO, USABLE), causes=("few",)),
+    Scenario(
+        "two views", _with(standing=_held(count=2)), grades=(NO, USABLE, REFUSED), causes=("few", REFUSED)
+    ),
     Scenario("three views", _with(standing=_held(count=3)), grades=(NO, USABLE), causes=("few",)),
     Scenario("five views", _with(standing=_held(count=5)), grades=(*ANY_GOOD, *NOT_GOOD), causes=FEW),
     Scenario(

@@ -39,6 +39,7 @@ from orthoscope.targets.detections import Detections
 __all__ = ["Groups", "two_groups"]
 
 APART = 0.7  # of the error of one camera for all
+BEYOND_DOUBT = 0.5  # of it: with less, no other start is tried
 TWICE_AS_LIKELY = 2.5  # logarithm of the likelihood ratio: two values against a spread
 CERTAINLY = 0.95  # a view with less than this for either group is in none
 # of the squared residuals: what the linear step must explain of them before fits are worth their time
@@ -98,13 +99,16 @@ def two_groups(
     noise = fit.noise * max(1.0, found.wishes.tau)
     groupings = _groupings(_quadratics(fit, noise, ("k1",)))
     explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
-    if explained > SMALL:
-        refined = [_refined(detections, second, base=base) for _, second in groupings[:REFINED]]
-        known = [one for one in refined if one is not None]
-        if known:
-            squares, second = min(known, key=lambda one: one[0])
-            if np.sqrt(squares / float(np.nansum(whole.squares))) < APART:
-                return _named(second, np.ones(len(second), dtype=bool))
+    joint, best = float(np.nansum(whole.squares)), (np.inf, None)
+    for _, start in groupings[:REFINED] if explained > SMALL else ():
+        refined = _refined(detections, start, base=base)
+        if refined is not None and refined[0] < best[0]:
+            best = refined
+        if np.sqrt(best[0] / joint) < BEYOND_DOUBT:
+            break
+    squares, second = best
+    if second is not None and np.sqrt(squares / joint) < APART:
+        return _named(second, np.ones(len(second), dtype=bool))
     return None if found.kind == "shutter" else _two_values(_quadratics(fit, noise))
 
 

@@ -1,5 +1,4 @@
-"""The verdict: what it says is true of the figures, and no two things that it can say contradict each other.
-"""
+"""What a verdict says is true of the figures, and no two things that it can say contradict each other."""
 
 from __future__ import annotations
 
@@ -126,12 +125,12 @@ def test_no_advice_leads_in_a_circle():
 
 def test_whatever_is_wrong_there_is_something_to_do():
     assert {cause.name for cause in CAUSES} <= {advice.cause for advice in ADVICE}
-    for s, verdict in VERDICTS:
+    for _, verdict in VERDICTS:
         assert bool(verdict.advice) or not verdict.cause
 
 
 def test_a_verdict_names_one_limit_at_most():
-    for s, verdict in VERDICTS:
+    for _, verdict in VERDICTS:
         assert bool(verdict.limit) == bool(verdict.cause)
         assert str(verdict).count(". ") <= 2
 

@@ -139,6 +139,12 @@ CAUSES: tuple[Cause, ...] = (
         lambda s: f"{_target(s)}: in every photograph its corners are off by the same {s.target_mm:.2g} mm",
     ),
     Cause(
+        "views",
+        lambda s: bool(s.suspects),
+        lambda s: Grade.GOOD,
+        lambda s: "; ".join(f"in {image} {what}" for image, what in s.suspects[:1]),
+    ),
+    Cause(
         "tilt",
         lambda s: _open(s) and s.tilt < LEVEL,
         _as_far_as_known,
@@ -160,12 +166,6 @@ CAUSES: tuple[Cause, ...] = (
         lambda s: not s.converged,
         lambda s: Grade.USABLE,
         lambda s: "the search for the camera did not come to an end",
-    ),
-    Cause(
-        "views",
-        lambda s: bool(s.suspects),
-        lambda s: Grade.GOOD,
-        lambda s: "; ".join(f"in {image} {what}" for image, what in s.suspects[:1]),
     ),
     Cause(
         "region",

@@ -46,9 +46,9 @@ def situation_of(found: Findings) -> Situation:
     detections, settings = calibration.detections, calibration.settings
     views, distinct = len(detections.views), distinct_views(detections)
     target, lens = found.misfit.target, found.misfit.lens
-    sizes = np.concatenate([np.hypot(*e.T) for e in calibration.residuals()])
     images = [view.image for view in detections.views]
     known = reference.known if reference else None
+    suspects = suspects_among(found.views, known, detections.target.points)
     told = distinct > DISTINCT * views  # copies agree with each other whatever is true
     return Situation(
         method=calibration.method,
@@ -68,7 +68,7 @@ def situation_of(found: Findings) -> Situation:
         noise_px=float(np.sqrt(2.0 * known.noise)) if known else calibration.rms_px,
         tilt=_tilt(calibration),
         corners=detections.corners,
-        wild=int((sizes > max(WILD * float(np.median(sizes)), WILD_PX)).sum()),
+        wild=_wild(calibration, {image for image, _ in suspects}),
         beyond=corners_beyond(calibration),
         fold=float(np.degrees(calibration.camera.lens.field_angle)),
         disagree=disagreement.kind,
@@ -79,7 +79,7 @@ def situation_of(found: Findings) -> Situation:
         lens_px=lens.test.systematic_px if told and is_misfit(lens.test, views) else 0.0,
         target_px=target.test.systematic_px if told and is_misfit(target.test, views) else 0.0,
         target_mm=1e3 * target.test.systematic_px / target.pixels_per_metre,
-        suspects=suspects_among(found.views, known, detections.target.points),
+        suspects=suspects,
         precious=precious_among(detections, reference.own_squares, reference.own_left_out)
         if reference
         else (),
@@ -130,6 +130,18 @@ def _error(reference: ReferenceFit | None, disagreement: Disagreement, copies: f
         return float("nan")
     apart = 0.0 if disagreement.kind == "shutter" else disagreement.by_px
     return float(np.hypot(np.sqrt(copies) * reference.error.seen_px, apart))
+
+
+def _wild(calibration: Calibration, suspects: set[str]) -> int:
+    """How many corners are far from where the others put them, photographs that do not belong left aside."""
+    sizes = [np.hypot(*e.T) for e in calibration.residuals()]
+    limit = max(WILD * float(np.median(np.concatenate(sizes))), WILD_PX)
+    views = calibration.detections.views
+    return sum(
+        int((size > limit).sum())
+        for size, view in zip(sizes, views, strict=True)
+        if view.image not in suspects
+    )
 
 
 def _tilt(calibration: Calibration) -> float:

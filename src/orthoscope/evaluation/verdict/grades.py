@@ -36,18 +36,17 @@ class _Row(NamedTuple):
 GRADES: tuple[_Row, ...] = (
     _Row(
         Grade.GOOD,
-        f"off by {FINE_PX:g} px at most where corners were seen, which is {100 * WIDE:.0f} % of the frame or more",
+        f"off by {FINE_PX:g} px at most where corners were seen: {100 * WIDE:.0f} % of the frame or more",
         lambda s: s.error_px <= FINE_PX and s.held >= WIDE,
     ),
     _Row(
         Grade.REGION,
-        f"off by {FINE_PX:g} px at most where corners were seen, which is less of the frame",
+        f"off by {FINE_PX:g} px at most where corners were seen: less of the frame",
         lambda s: s.error_px <= FINE_PX,
     ),
     _Row(
         Grade.USABLE,
-        f"off by more, or something is wrong that is named, but by no more than {COARSE_PX:g} px (of an image 1000 px"
-        " wide)",
+        f"off by more, or with a fault that is named, but by {COARSE_PX:g} px (in 1000) at most",
         lambda s: s.error_px <= s.coarse_px,
     ),
     _Row(Grade.NO, "off by more than that, or nobody knows by how much", lambda s: True),

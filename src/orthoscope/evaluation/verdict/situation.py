@@ -19,8 +19,9 @@ class Situation:
     """The facts.
 
     Args:
-        method, lens, shape, base, through: what the calibration was made by (shape: what it came to), as it is called again; empty
-            where it has no such setting.
+        method, lens, base, through: what the calibration was made by, as it is called again; empty where it
+            has no such setting.
+        shape: of the target, that it came to.
         views: photographs that were used.
         distinct: of these, those that are not near-copies of another.
         converged: whether the search for the camera came to an end.
