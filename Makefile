@@ -1,5 +1,6 @@
 # make demo    the main job, with photographs that it renders itself
-# make test    the tests
+# make test    the tests, without the slow ones
+# make test-all all of them
 # make picture the picture in README.md, from the demo
 # make check   all that CI checks: format, lint, types, rooms, tests
 # make bench   this project beside its peers; ONLY=solving runs that part (benchmarks/README.md)
@@ -8,18 +9,18 @@ VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test quick check format lint types rooms picture bench bench-peers clean
+.PHONY: release-check demo test test-all check format lint types rooms picture bench bench-peers clean
 
 demo: $(VENV)/installed
 	$(BIN)/orthoscope demo -o demo
 
 test: $(VENV)/installed
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
 
-quick: $(VENV)/installed
-	$(BIN)/pytest -n auto -m "not slow"
+test-all: $(VENV)/installed
+	$(BIN)/pytest -n auto --dist worksteal
 
-check: lint types rooms test
+check: lint types rooms test-all
 
 lint: $(VENV)/installed
 	$(BIN)/ruff format --check
@@ -49,6 +50,15 @@ bench-peers:
 	benchmarks/.peers/lensboy/bin/pip install --quiet lensboy "opencv-contrib-python<5"
 	$(PYTHON) -m venv benchmarks/.peers/discorpy
 	benchmarks/.peers/discorpy/bin/pip install --quiet discorpy
+
+release-check: $(VENV)/installed
+	$(BIN)/pip install --quiet build twine
+	rm -rf dist build/bare
+	$(BIN)/python -m build --quiet --outdir dist
+	$(BIN)/twine check --strict dist/*
+	$(PYTHON) -m venv build/bare
+	build/bare/bin/pip install --quiet dist/*.whl
+	cd build && bare/bin/python ../tests/helpers/run_readme.py ../README.md
 
 clean:
 	rm -rf $(VENV) demo

@@ -6,7 +6,8 @@
     >>> evaluation = orthoscope.evaluate(calibration)
     >>> orthoscope.save(calibration, "calibration.json")
 
-Names are loaded when they are first used, so that `import orthoscope` costs nothing.
+What is public is what stands in `__all__` here; everything else may move. Names are loaded when they are
+first used, so that `import orthoscope` costs nothing.
 """
 
 from __future__ import annotations
@@ -21,17 +22,24 @@ if TYPE_CHECKING:
     from orthoscope.evaluation.comparison.compare import Comparison as Comparison
     from orthoscope.evaluation.comparison.compare import compare as compare
     from orthoscope.evaluation.evaluate import Evaluation as Evaluation
+    from orthoscope.evaluation.evaluate import UnseenError as UnseenError
     from orthoscope.evaluation.evaluate import evaluate as evaluate
+    from orthoscope.evaluation.evaluate import evaluate_on as evaluate_on
     from orthoscope.evaluation.metrics import normalised_calibration_error as normalised_calibration_error
     from orthoscope.files.images import read_image as read_image
     from orthoscope.files.images import write_image as write_image
     from orthoscope.fitting.calibration import Calibration as Calibration
+    from orthoscope.fitting.calibration import Uncertainty as Uncertainty
     from orthoscope.fitting.held_out import held_out as held_out
     from orthoscope.fitting.resection import resect as resect
     from orthoscope.formats.export import export as export
+    from orthoscope.formats.load import load_camera as load_camera
     from orthoscope.formats.own.json import load as load
-    from orthoscope.formats.own.json import load_camera as load_camera
+    from orthoscope.formats.own.json import load_calibration as load_calibration
+    from orthoscope.formats.own.json import load_detections as load_detections
+    from orthoscope.formats.own.json import load_evaluation as load_evaluation
     from orthoscope.formats.own.json import save as save
+    from orthoscope.formats.table import FORMATS as FORMATS
     from orthoscope.geometry.arrays import CalibrationError as CalibrationError
     from orthoscope.geometry.arrays import InputError as InputError
     from orthoscope.geometry.pose import Pose as Pose
@@ -40,42 +48,51 @@ if TYPE_CHECKING:
     from orthoscope.models.camera import Camera as Camera
     from orthoscope.models.camera import Intrinsics as Intrinsics
     from orthoscope.models.difference import image_difference as image_difference
+    from orthoscope.models.lens import Lens as Lens
     from orthoscope.models.lenses import LENSES as LENSES
     from orthoscope.models.target_shape import TargetShape as TargetShape
     from orthoscope.report.page import write_report as write_report
     from orthoscope.simulation.render import render as render
     from orthoscope.simulation.scene import Scene as Scene
+    from orthoscope.simulation.scene import random_views as random_views
     from orthoscope.simulation.scene import simulate_detections as simulate_detections
     from orthoscope.straight.undistort import undistort as undistort
     from orthoscope.targets.detections import Detections as Detections
-    from orthoscope.targets.detections import Target as Target
+    from orthoscope.targets.detections import Outlier as Outlier
+    from orthoscope.targets.detections import SetAside as SetAside
     from orthoscope.targets.detections import View as View
-    from orthoscope.targets.detections import chessboard as chessboard
-    from orthoscope.targets.detections import parse_target as parse_target
+    from orthoscope.targets.table import parse_target as parse_target
+    from orthoscope.targets.target import Target as Target
+    from orthoscope.targets.target import chessboard as chessboard
 
 ROOMS = {
-    "evaluation.comparison.compare": ("Comparison", "compare"),
-    "models.difference": ("image_difference",),
-    "evaluation.evaluate": ("Evaluation", "evaluate"),
-    "evaluation.metrics": ("normalised_calibration_error",),
-    "simulation.render": ("render",),
-    "simulation.scene": ("Scene", "simulate_detections"),
-    "geometry.arrays": ("CalibrationError", "InputError"),
-    "geometry.pose": ("Pose",),
-    "targets.detections": ("Detections", "Target", "View", "chessboard", "parse_target"),
     "detection.detect": ("detect",),
-    "formats.export": ("export",),
+    "evaluation.comparison.compare": ("Comparison", "compare"),
+    "evaluation.evaluate": ("Evaluation", "UnseenError", "evaluate", "evaluate_on"),
+    "evaluation.metrics": ("normalised_calibration_error",),
     "files.images": ("read_image", "write_image"),
-    "formats.own.json": ("load", "load_camera", "save"),
-    "straight.undistort": ("undistort",),
-    "methods": ("METHODS", "calibrate"),
-    "fitting.calibration": ("Calibration",),
+    "fitting.calibration": ("Calibration", "Uncertainty"),
     "fitting.held_out": ("held_out",),
     "fitting.resection": ("resect",),
+    "formats.export": ("export",),
+    "formats.load": ("load_camera",),
+    "formats.own.json": ("load", "load_calibration", "load_detections", "load_evaluation", "save"),
+    "formats.table": ("FORMATS",),
+    "geometry.arrays": ("CalibrationError", "InputError"),
+    "geometry.pose": ("Pose",),
+    "methods": ("METHODS", "calibrate"),
     "models.camera": ("Camera", "Intrinsics"),
+    "models.difference": ("image_difference",),
+    "models.lens": ("Lens",),
     "models.lenses": ("LENSES",),
     "models.target_shape": ("TargetShape",),
     "report.page": ("write_report",),
+    "simulation.render": ("render",),
+    "simulation.scene": ("Scene", "random_views", "simulate_detections"),
+    "straight.undistort": ("undistort",),
+    "targets.detections": ("Detections", "Outlier", "SetAside", "View"),
+    "targets.table": ("parse_target",),
+    "targets.target": ("Target", "chessboard"),
 }
 _ROOM_OF = {name: room for room, names in ROOMS.items() for name in names}
 

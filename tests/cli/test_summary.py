@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orthoscope.cli.summary import evaluation_lines, evaluation_numbers
+from orthoscope.cli.summary import evaluation_lines
 from orthoscope.evaluation.evaluate import Evaluation, evaluate
 from orthoscope.methods.fccm import fccm
 from orthoscope.simulation.scene import paper_scene, simulate_detections
@@ -59,8 +59,3 @@ def test_three_lines_say_what_matters_and_the_verdict_is_the_first(evaluation: E
 def test_who_wants_every_figure_gets_it(evaluation: Evaluation):
     words = {line.split()[0] for line in evaluation_lines(evaluation, verbose=True)}
     assert {"off", "rms", "held", "NCE", "misfit", "agreement", "lens"} <= words
-
-
-def test_for_machines_every_corner_left_out_has_its_reason(evaluation: Evaluation):
-    (told,) = evaluation_numbers(with_outliers(evaluation, OUTLIERS[:1]))["corners_left_out"]
-    assert told == {"image": "00.jpg", "id": 0, "pixel": (1.0, 2.0), "reason": "9.0 px off"}

@@ -191,6 +191,7 @@ def small_boards_but_for(empty: tuple[int, int]) -> Detections:
     return simulate_detections(Scene(SIMPLE, BOARD, tuple(poses)), noise_px=0.02, rng=rng)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("empty", NINTHS, ids=NINTHS.values())
 def test_the_place_that_no_photograph_covers_is_found(empty):
     assert emptiest_place(small_boards_but_for(empty)) == NINTHS[empty]

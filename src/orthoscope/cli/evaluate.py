@@ -22,6 +22,7 @@ Examples:
   photos     5 used, 0 set aside; 270 corners
   board      the one of the calibration: 0.158 px with the shape found there, 0.241 without; the shape found
   there is used
+  $ orthoscope evaluate camera_info.yaml --on photos/ --target chessboard:9x6:25mm
 
 \b
 Whether other photographs show the board of the calibration is found out by its shape;
@@ -30,7 +31,7 @@ with --target they show that one, taken as it is said to be.
 
 
 @click.command(epilog=EXAMPLE)
-@options.calibration_file
+@click.argument("calibration", metavar="CAMERA")
 @click.option(
     "--on",
     "others",
@@ -40,50 +41,62 @@ with --target they show that one, taken as it is said to be.
 )
 @options.target
 @options.image_size
-@options.folds
+@options.folds_anew
 @options.jobs
 @options.cluster
 @options.verbose
 @options.as_json
 def evaluate(
-    calibration: Path,
+    calibration: str,
     others: tuple[str, ...],
     target: str | None,
     image_size: tuple[int, int] | None,
-    folds: int,
+    folds: int | None,
     jobs: int | None,
     cluster: str | None,
     verbose: bool,
     as_json: bool,
 ) -> None:
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
-    from orthoscope.cli.executors import processes, threads
+    from orthoscope.cli.executors import threads
     from orthoscope.cli.inputs import detections_from
+    from orthoscope.cli.judged import EVALUATION, judged
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
-    from orthoscope.evaluation.evaluate import evaluate as judge
+    from orthoscope.cli.summary import evaluation_lines, to_json
     from orthoscope.evaluation.evaluate import evaluate_on
     from orthoscope.evaluation.same_board import same_board
-    from orthoscope.formats.own.json import load_calibration
+    from orthoscope.fitting.calibration import Calibration
+    from orthoscope.formats.load import load_source
+    from orthoscope.formats.own.json import text_of
+    from orthoscope.geometry.arrays import InputError
 
-    loaded = load_calibration(calibration)
-    if not others:
-        with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
-            evaluation = judge(loaded, folds=folds, executor=executor, progress=progress)
+    path = Path(calibration)
+    if not others and (path.is_dir() or path.name == EVALUATION):
+        loaded = None
+    else:
+        loaded = load_source(calibration, image_size=image_size)
+        if not isinstance(loaded, Calibration) and not (others and target):
+            raise InputError(
+                f"{calibration} is a camera without the photographs that it was made from; expected photographs"
+                " and their target: --on PHOTOS --target chessboard:9x6:25mm."
+            )
+    if not others or loaded is None:
+        evaluation = judged(path, folds=folds, jobs=jobs, cluster=cluster)
         click.echo(
-            to_json(evaluation_numbers(evaluation))
+            text_of(evaluation)
             if as_json
-            else "\n".join(evaluation_lines(evaluation, verbose=verbose))
+            else "\n".join(evaluation_lines(evaluation, verbose=verbose)) + "\n",
+            nl=False,
         )
         return
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
-        board = target or loaded.detections.target
+        board = target or loaded.detections.target  # type: ignore[union-attr]  # a calibration, as checked above
         detections, _ = detections_from(
             others, board, image_size=image_size, executor=executor, progress=progress
         )
     test = evaluate_on(loaded.camera, detections)
     board = None
-    if not target and loaded.target_shape.kind != "flat":
+    if isinstance(loaded, Calibration) and not target and loaded.target_shape.kind != "flat":
         board = same_board(loaded.camera, loaded.target_shape, test.detections)
         if board.same:
             test = evaluate_on(loaded.camera, detections, shape=loaded.target_shape)

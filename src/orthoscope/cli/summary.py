@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
     from orthoscope.models.camera import Camera
     from orthoscope.targets.detections import Outlier
 
-__all__ = ["camera_numbers", "evaluation_lines", "evaluation_numbers", "to_json"]
+__all__ = ["camera_numbers", "evaluation_lines", "to_json"]
 
 SHOWN = 6  # photographs set aside that are listed one by one
 
@@ -59,6 +58,8 @@ def _photographs_line(evaluation: Evaluation) -> str:
 
 def _details(evaluation: Evaluation) -> list[str]:
     """Figures for experts, and everything one by one."""
+    from orthoscope.geometry.numbers import with_error
+
     calibration = evaluation.calibration
     detections, camera, aside = calibration.detections, calibration.camera, calibration.detections.set_aside
     deviations = calibration.uncertainty.deviations
@@ -75,8 +76,8 @@ def _details(evaluation: Evaluation) -> list[str]:
     )
     if not math.isnan(evaluation.held_out_rms_px):
         lines.append(
-            f"held out   {evaluation.held_out_rms_px:.3f} ± {evaluation.held_out_error_px:.3f} px per point,"
-            " on views that were not used"
+            f"held out   {with_error(evaluation.held_out_rms_px, evaluation.held_out_error_px)} px per point, on"
+            " views that were not used"
         )
     lines.append(f"NCE        {evaluation.nce:.3f} (1 is what rounding to whole pixels would give)")
     lines.append(f"misfit     {_misfit_line(evaluation.misfit.target.test, evaluation.misfit.lens.test)}")
@@ -136,76 +137,6 @@ def _choice_lines(calibration: Calibration) -> list[str]:
     return lines
 
 
-def evaluation_numbers(evaluation: Evaluation) -> dict[str, Any]:
-    """The same as one object for machines; what is not known is None."""
-    calibration = evaluation.calibration
-    detections = calibration.detections
-    return {
-        "rms_px": evaluation.rms_px,
-        "median_px": evaluation.median_px,
-        "largest_px": evaluation.largest_px,
-        "held_out_rms_px": evaluation.held_out_rms_px,
-        "held_out_error_px": evaluation.held_out_error_px,
-        "nce": evaluation.nce,
-        "verdict": str(evaluation.verdict),
-        "grade": evaluation.verdict.grade,
-        "cause": evaluation.verdict.cause,
-        "camera_error": _error_numbers(evaluation),
-        "agreement": {
-            "f2": evaluation.disagreement.f2,
-            "p_value": evaluation.disagreement.p_value,
-            "kind": evaluation.disagreement.kind,
-            "by_px": evaluation.disagreement.by_px,
-            "groups": [list(group) for group in evaluation.situation.groups],
-        },
-        "misfit": {
-            "target": asdict(evaluation.misfit.target.test),
-            "lens": asdict(evaluation.misfit.lens.test),
-        },
-        "coverage": evaluation.coverage,
-        "corners": detections.corners,
-        "views_used": len(detections.views),
-        "views_rejected": [{"name": entry.image, "reason": entry.reason} for entry in detections.set_aside],
-        "corners_left_out": [outlier._asdict() for outlier in detections.outliers],
-        "views_suspect": [{"name": image, "reason": reason} for image, reason in evaluation.suspects],
-        "views": [
-            {
-                "name": view.image,
-                "corners": view.corners,
-                "rms_px": view.rms_px,
-                "held_out_rms_px": view.held_out_rms_px,
-            }
-            for view in evaluation.views
-        ],
-        "camera": camera_numbers(calibration.camera),
-        "deviations": calibration.uncertainty.deviations,
-        "method": calibration.method,
-        "target_shape": {
-            "kind": calibration.target_shape.kind,
-            "rms_mm": 1e3 * calibration.target_shape.rms,
-            "height_mm": 1e3 * calibration.target_shape.height,
-        },
-        "candidates": [one._asdict() for one in calibration.candidates],
-        "status": calibration.status,
-        "warnings": list(evaluation.warnings),
-    }
-
-
-def _error_numbers(evaluation: Evaluation) -> dict[str, Any] | None:
-    """How far off the camera is, and the region where it may be used."""
-    error = evaluation.error
-    if error is None:
-        return None
-    return {
-        "seen_px": error.seen_px,
-        "frame_px": error.frame_px,
-        "near_seen_px": error.near_seen_px,
-        "near_frame_px": error.near_frame_px,
-        "limit_px": error.limit_px,
-        "region": error.region.tolist(),
-    }
-
-
 def camera_numbers(camera: Camera) -> dict[str, Any]:
     """A camera as plain numbers."""
     from orthoscope.models.lenses import lens_name
@@ -260,9 +191,7 @@ def _plain(thing: Any) -> Any:
 
 
 def _number(name: str, value: float, deviations: dict[str, float]) -> str:
-    """`fx 533.04 ± 0.61`: as many digits as the standard deviation makes meaningful."""
-    deviation = deviations.get(name)
-    if deviation is None or not math.isfinite(deviation) or deviation <= 0:
-        return f"{name} {value:.6g}"
-    places = max(0, 1 - math.floor(math.log10(deviation)))
-    return f"{name} {value:.{places}f} ± {deviation:.{places}f}"
+    """`fx 533.04 ± 0.61`."""
+    from orthoscope.geometry.numbers import six_digits, with_error
+
+    return f"{name} {with_error(value, deviations.get(name, math.nan), alone=six_digits)}"

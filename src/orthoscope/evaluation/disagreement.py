@@ -31,10 +31,10 @@ import numpy as np
 from orthoscope.evaluation.misfit.f_distribution import f_survival
 from orthoscope.fitting.leave_one_out import hat_of
 from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.reprojection import with_parameters
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
+from orthoscope.models.parameters import Parameters
 from orthoscope.targets.detections import Detections
 
 __all__ = ["AGREED", "Disagreement", "Wishes", "changes_of", "disagreement", "spread_of", "wishes"]
@@ -93,7 +93,7 @@ class Disagreement:
             photographs, after a rotation.
         focal: standard deviation of the focal length over photographs, as a share of it.
         centre_px: standard deviation of the principal point, pixels.
-        wishes: of scale, cx and cy.
+        wishes: of scale, cx and cy; None where there was no test, or it was read from a file.
     """
 
     f2: float
@@ -103,10 +103,10 @@ class Disagreement:
     by_px: float
     focal: float
     centre_px: float
-    wishes: Wishes | None
+    wishes: Wishes | None = None
 
 
-AGREED = Disagreement(float("nan"), float("nan"), False, "", 0.0, 0.0, 0.0, None)
+AGREED = Disagreement(float("nan"), float("nan"), False, "", 0.0, 0.0, 0.0)
 
 
 def disagreement(fit: Linearised, detections: Detections) -> Disagreement:
@@ -240,7 +240,7 @@ def _movement(fit: Linearised, changes: ndarray, spread: ndarray, pixels: Float[
 
 def _moved_squared(camera: Camera, names: tuple[str, ...], step: ndarray, pixels: ndarray) -> float:
     sample = pixels[:: max(1, len(pixels) // SAMPLE)]
-    difference = image_difference(camera, with_parameters(camera, names, step), sample)
+    difference = image_difference(camera, Parameters.of(names).moved(camera, step), sample)
     return float(np.nanmean((difference**2).sum(1)))
 
 

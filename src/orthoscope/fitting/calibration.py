@@ -15,8 +15,10 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
+from orthoscope.models.parameters import Parameters
 from orthoscope.models.target_shape import TargetShape
-from orthoscope.targets.detections import Detections, Target
+from orthoscope.targets.detections import Detections
+from orthoscope.targets.target import Target
 
 __all__ = ["Calibration", "Candidate", "Uncertainty", "Variances", "points_of", "residuals_of", "rms"]
 
@@ -46,14 +48,18 @@ class Uncertainty:
         model = self.covariance if self.model is None else self.model
         object.__setattr__(self, "model", frozen(np.reshape(model, (k, k)), (k, k), "covariance of model"))
 
+    def __repr__(self) -> str:
+        told = (f"{name} {deviation:.2g}" for name, deviation in self.deviations.items())
+        return f"Uncertainty({', '.join(told)})"
+
     @property
     def deviations(self) -> dict[str, float]:
         """The standard deviation of each estimated parameter."""
         roots = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return {
             single: float(root)
-            for name, root in zip(self.names, roots, strict=True)
-            for single in name.split("=")
+            for tied, root in zip(Parameters.of(self.names).groups, roots, strict=True)
+            for single in tied
         }
 
 
@@ -151,6 +157,12 @@ class Calibration:
                 f"{len(self.camera_from_target)} poses for {len(self.detections.views)} views; expected one"
                 " for each."
             )
+
+    def __repr__(self) -> str:
+        return (
+            f"Calibration({self.method}, rms {self.rms_px:.3g} px, target {self.target_shape.kind})\n"
+            f"  {self.camera!r}\n  {self.detections!r}"
+        )
 
     def residuals(self) -> tuple[Float[ndarray, "_ 2"], ...]:
         """Predicted minus detected, pixels, an array (n,2) for each view; the formula's own value where its

@@ -13,9 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from orthoscope.fitting.calibration import Uncertainty
-from orthoscope.fitting.reprojection import Estimate, parameter_columns
+from orthoscope.fitting.reprojection import Estimate
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.models.camera import Camera
+from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import Solution
 from orthoscope.targets.detections import Detections
 
@@ -93,10 +94,12 @@ def _relative_deviation_of_scale(camera: Camera, free: Sequence[str], covariance
 
     Some lenses share this scale between fx and a coefficient, and neither then is certain by itself.
     """
-    x = np.array([1e-4, 2e-4])
-    columns, pixels = parameter_columns(camera, x, np.zeros(2), free)
-    scale, gradient = np.diff(pixels[0])[0], np.diff(columns[:, 0])[:, 0]
-    usual = np.array([1.0 if set(group.split("=")) <= set(camera.lens.names()) else scale for group in free])
+    parameters = Parameters.of(free)
+    image = camera.linearise(np.array([[1e-4, 2e-4], [0.0, 0.0], [1.0, 1.0]]), parameters)
+    scale, gradient = np.diff(image.u)[0], np.diff(image.by_parameters()[:, 0])[:, 0]
+    usual = np.array(
+        [1.0 if set(names) <= set(parameters.coefficients) else scale for names in parameters.groups]
+    )
     matters = (
         np.abs(gradient) * usual > 1e-5 * scale
     )  # the others may be open, and infinity times nothing is not nothing

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orthoscope.fitting.reprojection import parameter_columns
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.parameters import Parameters
 
 __all__ = ["difference_of_images", "image_slopes", "motion_slopes"]
 
@@ -33,12 +33,12 @@ def image_slopes(
 
     Raises InputError for a name that the camera does not have.
     """
-    x, y = camera.lens.chart.flatten(*rays.T)
-    columns, _ = parameter_columns(camera, x, y, names)
-    slopes = columns.transpose(2, 1, 0)
+    parameters = Parameters.of(names)
+    parameters.check(camera)
+    slopes = camera.linearise(rays.T, parameters).by_parameters().transpose(2, 1, 0)
     if not isinstance(camera.lens, FreeLens):
         return slopes
-    splines = camera.lens.over.lattice.design(*camera.lens.base.warp(x, y))
+    splines = camera.lens.over.lattice.design(*camera.lens.base.warp(*camera.lens.chart.flatten(*rays.T)))
     plane = (camera.lens_frame or camera.intrinsics).matrix[:2, :2]
     of_splines = [plane[:, i][None, :, None] * splines[:, None] for i in (0, 1)]
     return np.concatenate([slopes, *of_splines], axis=2)
@@ -100,11 +100,4 @@ def difference_of_images(
 
 def _by_point(camera: Camera, points: Float[ndarray, "n 3"]) -> Float[ndarray, "n 2 3"]:
     """d pixel / d point."""
-    frame = camera.lens_frame or camera.intrinsics
-    turn = np.eye(3) if camera.lens_frame is None else np.linalg.solve(frame.matrix, camera.intrinsics.matrix)
-    x, y, pull_back = camera.lens.chart.linearise(*(points @ turn.T).T)
-    at = camera.lens.linearise(x, y)
-    plane = frame.matrix[:2, :2]
-    by_place = np.array([[at.j_xx, at.j_xy], [at.j_yx, at.j_yy]])  # (2, 2, n)
-    by_pixel = np.einsum("ij,jkn->ikn", plane, by_place)
-    return np.stack([np.stack(pull_back(*row), axis=-1) for row in by_pixel], axis=1) @ turn
+    return np.stack([np.stack(row, axis=-1) for row in camera.linearise(points.T).by_point], axis=1)

@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from orthoscope.fitting.reprojection import parameter_columns, with_parameters
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.lens import Formula
+from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
 
@@ -121,8 +121,13 @@ def about_principal_point(
     coefficients.
     """
 
-    def columns(camera, rays, free):
-        x, y = camera.lens.chart.flatten(*rays.T)
-        return parameter_columns(camera, x, y, free)
+    parameters = Parameters.of(free)
 
-    return Pairs(rays, pixels, free, columns=columns, moved=with_parameters)
+    def columns(camera, rays, _):
+        image = camera.linearise(rays.T, parameters)
+        return image.by_parameters(), np.stack([image.u, image.v])
+
+    def moved(camera, _, step):
+        return parameters.moved(camera, step)
+
+    return Pairs(rays, pixels, parameters.names, columns=columns, moved=moved)

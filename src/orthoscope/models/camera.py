@@ -8,17 +8,24 @@ centre.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.models.chunks import in_blocks
 from orthoscope.models.lens import Lens
+from orthoscope.models.opencv_order import opencv_distortion
+from orthoscope.models.parameters import Parameters
+from orthoscope.models.pixel_slopes import PixelSlopes
 from orthoscope.models.smooth_map import smooth_map
 
-__all__ = ["WIDEST", "Camera", "Intrinsics", "image_border"]
+__all__ = ["LARGEST_SIDE", "WIDEST", "Camera", "Intrinsics", "image_border"]
 
+# No image has a side of more pixels; a file that says so is damaged.
+LARGEST_SIDE = 1_000_000
 WIDEST = np.deg2rad(75.0)  # rays farther from the axis than this a pin-hole stretches without end
 
 
@@ -97,22 +104,80 @@ class Camera:
 
     def __post_init__(self) -> None:
         width, height = (int(side) for side in self.image_size)
-        if width < 1 or height < 1:
-            raise InputError(f"image_size is {self.image_size}; expected (width, height) in pixels.")
+        if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
+            raise InputError(
+                f"image_size is {self.image_size}; expected (width, height), 1 to {LARGEST_SIDE} pixels each."
+            )
         object.__setattr__(self, "image_size", (width, height))
 
-    def project(self, points: Float[ndarray, "n 3"], *, beyond: bool = False) -> Float[ndarray, "n 2"]:
-        """Pixels (n,2) of points (n,3) in the camera frame, any unit; NaN where the lens gives them no image.
+    def __repr__(self) -> str:
+        (width, height), (fx, fy, cx, cy, skew) = self.image_size, self.intrinsics.as_tuple()
+        pin_hole = f"fx {fx:.6g} fy {fy:.6g} cx {cx:.6g} cy {cy:.6g}" + (f" skew {skew:.3g}" if skew else "")
+        centre = f" about ({self.lens_frame.cx:.6g}, {self.lens_frame.cy:.6g})" if self.lens_frame else ""
+        return f"Camera({width}x{height}, {pin_hole}, {self.lens!r}{centre})"
 
-        beyond: let the formula go on where the lens's domain has ended, as least squares does; such pixels
-        are no images.
+    @property
+    def K(self) -> Float[ndarray, "3 3"]:
+        """The pin-hole's matrix, [fx skew cx; 0 fy cy; 0 0 1], pixels."""
+        return self.intrinsics.matrix
+
+    def opencv(self) -> tuple[Float[ndarray, "3 3"], Float[ndarray, " k"]]:
+        """K and distortion as OpenCV takes them, of cv2 for brown and rational, of cv2.fisheye else.
+
+        Raises:
+            InputError: OpenCV has no such lens, no skew, or no distortion centre of its own.
         """
-        return (self.lens_frame or self.intrinsics).to_pixels(
-            self.lens.distort(self._lens_rays(points), beyond=beyond)
-        )
+        if self.intrinsics.skew or self.lens_frame is not None:
+            what = "distortion centre of its own" if self.lens_frame else "skew"
+            raise InputError(f"OpenCV has no {what}, and this camera has one. Calibrate without it.")
+        return self.K, np.array(opencv_distortion(self.lens))
 
-    def unproject(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
-        """Unit rays (n,3), camera frame, that fall on pixels (n,2); NaN where none does."""
+    def linearise(self, points: Iterable[ndarray], free: Parameters | Iterable[str] = ()) -> PixelSlopes:
+        """Pixels of points and their slopes by point and parameter; the formula goes on beyond its domain.
+
+        Args:
+            points: X, Y and Z in the camera frame, arrays of one shape, any unit.
+            free: parameters whose slopes are wanted, as models/parameters.py names them.
+        """
+        return PixelSlopes(self, points, Parameters.of(free))
+
+    def project(self, points: ArrayLike, *, beyond: bool = False) -> ndarray:
+        """Pixels of points in the camera frame; NaN where the lens gives them no image.
+
+        Args:
+            points: (n,3), or (3,) for one; any unit.
+            beyond: let the formula go on where the lens's domain has ended, as least squares does; such
+                pixels are no images.
+
+        Returns:
+            (n,2), or (2,) for one.
+
+        Raises:
+            InputError: the points have another shape.
+        """
+        points = _rows(points, 3, "points")
+        frame = self.lens_frame or self.intrinsics
+        pixels = frame.to_pixels(self.lens.distort(self._lens_rays(np.atleast_2d(points)), beyond=beyond))
+        return pixels if points.ndim == 2 else pixels[0]
+
+    def unproject(self, pixels: ArrayLike) -> ndarray:
+        """Unit rays, camera frame, that fall on pixels; NaN where none does.
+
+        Args:
+            pixels: (n,2), or (2,) for one.
+
+        Returns:
+            (n,3), or (3,) for one.
+
+        Raises:
+            InputError: the pixels have another shape.
+        """
+        pixels = _rows(pixels, 2, "pixels")
+        rays = self._rays(np.atleast_2d(pixels))
+        return rays if pixels.ndim == 2 else rays[0]
+
+    def _rays(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
+        """Unit rays of pixels."""
         frame = self.lens_frame or self.intrinsics
         rays = in_blocks(
             lambda u, v: self.lens.chart.lift(*self.lens.unwarp(*frame.place(u, v))), pixels, width=3
@@ -133,6 +198,73 @@ class Camera:
         fx, fy, cx, cy, skew = self.intrinsics.as_tuple()
         lens = self.lens.with_coefficients(**{name: getattr(self.lens, name) / scale})
         return replace(self, intrinsics=Intrinsics(scale * fx, scale * fy, cx, cy, scale * skew), lens=lens)
+
+    def resized(self, size: tuple[int, int]) -> Camera:
+        """The same camera where its photographs are scaled to another size, a pixel's corner to a pixel's
+        corner.
+
+        Args:
+            size: (width, height) of the new photographs; the same shape or not.
+        Raises:
+            InputError: a side is less than 1.
+        """
+        width, height = self._checked_size(size)
+        across, down = width / self.image_size[0], height / self.image_size[1]
+        return self._with_frame(
+            (width, height),
+            lambda k: Intrinsics(
+                across * k.fx,
+                down * k.fy,
+                across * (k.cx + 0.5) - 0.5,
+                down * (k.cy + 0.5) - 0.5,
+                across * k.skew,
+            ),
+        )
+
+    def cropped(self, left: int, top: int, size: tuple[int, int]) -> Camera:
+        """The same camera where its photographs are cut to a part of them.
+
+        Args:
+            left, top: the part's first pixel, in pixels of this camera.
+            size: (width, height) of the part.
+        Raises:
+            InputError: the part is not within the image.
+        """
+        width, height = self._checked_size(size)
+        if left < 0 or top < 0 or left + width > self.image_size[0] or top + height > self.image_size[1]:
+            raise InputError(
+                f"a part of {width}x{height} from pixel ({left}, {top}) is not within an image of"
+                f" {self.image_size[0]}x{self.image_size[1]}. Choose a part of the image."
+            )
+        return self._with_frame((width, height), lambda k: replace(k, cx=k.cx - left, cy=k.cy - top))
+
+    def binned(self, factor: int) -> Camera:
+        """The same camera where each block of factor x factor pixels is read as one; what is left over is cut
+        off.
+
+        Args:
+            factor: 2 or more; 1 changes nothing.
+        Raises:
+            InputError: the factor is less than 1 or larger than the image.
+        """
+        if factor < 1 or factor > min(self.image_size):
+            raise InputError(
+                f"binning by {factor} is not possible; expected 1 to {min(self.image_size)} pixels a block."
+            )
+        width, height = self.image_size[0] // factor, self.image_size[1] // factor
+        return self.cropped(0, 0, (width * factor, height * factor)).resized((width, height))
+
+    @staticmethod
+    def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+        width, height = (int(side) for side in size)
+        if width < 1 or height < 1:
+            raise InputError(f"the size is {width}x{height}; expected (width, height) of at least 1 pixel.")
+        return width, height
+
+    def _with_frame(self, size: tuple[int, int], moved: Callable[[Intrinsics], Intrinsics]) -> Camera:
+        """The camera of another size, its pixels moved."""
+        frame = self.lens_frame and moved(self.lens_frame)
+        return Camera(size, moved(self.intrinsics), self.lens, frame)
 
     def undistort_pixels(
         self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None
@@ -234,6 +366,21 @@ def image_border(image_size: tuple[int, int], samples: int = 64) -> Float[ndarra
     return np.concatenate(
         [a + t[:, None] * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
     )
+
+
+def _rows(values: ArrayLike, width: int, name: str) -> ndarray:
+    """An array of rows of a width, or one such row; as it is where it is one already."""
+    array = values if isinstance(values, ndarray) and values.dtype == np.float64 else _numbers(values, name)
+    if array.ndim not in (1, 2) or array.shape[-1] != width:
+        raise InputError(f"{name} have shape {array.shape}; expected (n, {width}), or ({width},) for one.")
+    return array
+
+
+def _numbers(values: ArrayLike, name: str) -> ndarray:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} are not numbers ({error}); expected rows of them.") from error
 
 
 def _in_front(plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:

@@ -22,7 +22,7 @@ from orthoscope.models.newton_inverse import invert
 __all__ = ["Brown", "Rational"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Decentred(Formula):
     """A radial curve with decentering (p), thin prism (s) and sensor tilt (tau, radians) added, as OpenCV
     adds them.
@@ -152,7 +152,7 @@ class _Decentred(Formula):
         return Warp(x, y, j_xx, j_xy, j_yx, j_yy, by)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Brown(_Decentred):
     """Radial k1 k2 k3, decentering p1 p2, thin prism s1..s4, tilt tau_x tau_y (OpenCV's 4, 5; 12 and 14
     without k4..k6).
@@ -178,7 +178,7 @@ class Brown(_Decentred):
         return {"k1": u, "k2": u2, "k3": u2 * u}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Rational(_Decentred):
     """(1 + k1 u + k2 u^2 + k3 u^3) / (1 + k4 u + k5 u^2 + k6 u^3) with the same additions (OpenCV's 8, 12 and
     14).

@@ -46,6 +46,10 @@ class FreeLens(Lens):
                 " one."
             )
 
+    def __repr__(self) -> str:
+        columns, rows = self.over.lattice.shape
+        return f"FreeLens({self.base!r}, {columns}x{rows} splines on top)"
+
     @property
     def chart(self) -> Chart:
         return self.base.chart

@@ -315,6 +315,10 @@ class Formula(Lens):
             [getattr(self, name) for name in self.names()], (None,), f"{type(self).__name__}: coefficients"
         )
 
+    def __repr__(self) -> str:
+        told = (f"{name}={value:.6g}" for name in self.names() if (value := getattr(self, name)))
+        return f"{type(self).__name__}({', '.join(told)})"
+
     @classmethod
     @cache
     def names(cls) -> tuple[str, ...]:  # type: ignore[override]  # a formula's names are its kind's

@@ -26,7 +26,7 @@ from orthoscope.models.lens import RadialLens
 __all__ = ["Division", "Fet", "Fov", "KannalaBrandt", "Pfet"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Pfet(RadialLens):
     """Polynomial fish-eye transform, r_d = a0 + a1 s + ... + a5 s^5 (the paper's eq. 1).
 
@@ -57,7 +57,7 @@ class Pfet(RadialLens):
         return prod([s] * power, start=np.ones_like(s)) if power >= 0 else 1.0 / s
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fet(RadialLens):
     """Fish-eye transform, r_d = s log(1 + l r); scale * l is the slope at the centre.
 
@@ -83,7 +83,7 @@ class Fet(RadialLens):
         return g / self.scale if name == "scale" else self.scale / (1.0 + self.l * s)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fov(RadialLens):
     """Field of view, r_d = atan(2 s tan(w/2)) / w, w in radians; w = 0 is no distortion."""
 
@@ -113,7 +113,7 @@ class Fov(RadialLens):
         return 2.0 * tangent / w, (1.0 + tangent * tangent) / w - 2.0 * tangent / (w * w)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Division(RadialLens):
     """Division, s = r_d / (1 + l r_d^2)."""
 
@@ -132,7 +132,7 @@ class Division(RadialLens):
         return u * g * g / np.sqrt(1.0 - 4.0 * self.l * u)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class KannalaBrandt(RadialLens):
     """r_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)."""
 

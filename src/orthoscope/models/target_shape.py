@@ -53,6 +53,12 @@ class TargetShape:
                 " free."
             )
 
+    def __repr__(self) -> str:
+        apart = (
+            1e3 * float(np.sqrt((self.displacements**2).sum(1).mean())) if len(self.displacements) else 0.0
+        )
+        return f"TargetShape({self.kind}, {len(self.displacements)} corners, {apart:.3g} mm rms from nominal)"
+
     @classmethod
     def flat(cls, corners: int) -> TargetShape:
         """The target as it is said to be."""

@@ -25,7 +25,6 @@ class Situation:
         views: photographs that were used.
         distinct: of these, those that are not near-copies of another.
         converged: whether the search for the camera came to an end.
-        assumed: whether something was taken for granted that the photographs could not tell.
         error_px: how far off the camera is, rms over the seen part; NaN where nothing says.
         coarse_px: error above which it is of no use.
         share: of the frame over which it is off by FINE_PX at most, by what is predicted; where no corners
@@ -60,7 +59,6 @@ class Situation:
     views: int = 15
     distinct: int = 15
     converged: bool = True
-    assumed: bool = False
     error_px: float = 0.1
     coarse_px: float = COARSE_PX
     share: float = 1.0

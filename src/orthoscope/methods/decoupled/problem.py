@@ -20,12 +20,13 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.fitting.observations import Poses
-from orthoscope.fitting.reprojection import POSE, with_parameters
+from orthoscope.fitting.reprojection import POSE
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements, MeasurementSums
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.parameters import Parameters
 from orthoscope.models.spline import Displacement
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
@@ -111,7 +112,7 @@ class Joint:
     ) -> DecoupledEstimate:
         """The estimate after a step; views: of the blocks that were eliminated, views or single corners."""
         k, g = len(self.free), len(self.energy)
-        camera = with_parameters(unknowns.camera, self.free, shared[:k])
+        camera = Parameters.of(self.free).moved(unknowns.camera, shared[:k])
         if isinstance(camera.lens, FreeLens):
             moved = camera.lens.over.coefficients + shared[k : k + 2 * g].reshape(2, g).T
             camera = replace(

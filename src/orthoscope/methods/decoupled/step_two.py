@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from orthoscope.fitting.lens_fit import FOCAL, about_principal_point, converted, fit_pairs
-from orthoscope.fitting.reprojection import INTRINSICS
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.step_one import StepOneFit
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import parse_lens
+from orthoscope.models.parameters import INTRINSICS, Parameters
 
 __all__ = ["by_simplicity", "formula_from_pairs", "nearest_formula", "pairs_of"]
 
@@ -46,7 +46,7 @@ def formula_from_pairs(fit: StepOneFit, lens: str) -> tuple[Camera, tuple[str, .
     that far from the axis, InputError for a lens that is none.
     """
     kind, coefficients = parse_lens(lens)
-    free = (*(name for name in fit.problem.free if set(name.split("=")) <= set(INTRINSICS)), *coefficients)
+    free = (*Parameters.of(fit.problem.free).only(INTRINSICS).names, *coefficients)
     rays, pixels = pairs_of(fit)
     starts = [replace(fit.estimate.camera, lens=kind(**start)) for start in kind.starts]
     camera = fit_pairs(about_principal_point(rays, pixels, free), starts, loss=fit.loss).unknowns

@@ -29,18 +29,17 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.fitting.observations import Observations, Poses
-from orthoscope.fitting.reprojection import Estimate, parameter_columns, with_parameters
+from orthoscope.fitting.reprojection import POSE, Estimate
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.geometry.projective import cross_ratio, cross_ratio_slope, fitted_lines
 from orthoscope.methods.mldc.lines_in_views import SeenLines
+from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 
 __all__ = ["CorrectedPoints", "Eq7"]
-
-POSE = 6
 
 
 class CorrectedPoints(NamedTuple):
@@ -76,7 +75,7 @@ class Eq7:
                 f"weights are {tuple(weights)}; expected three numbers from 0 up, for J_PH (more than 0),"
                 " J_CR and J_ST."
             )
-        self.free = tuple(free)
+        self.parameters = Parameters.of(free)
         self._weights = tuple(map(float, weights))
         self._present = observations.present
         self._points = target.points[observations.ids]
@@ -104,7 +103,7 @@ class Eq7:
         with np.errstate(all="ignore"):
             by_camera, by_pose, residual = self._of_pinhole(unknowns)
             m, n = self._present.shape
-            k, width = len(self.free), POSE + 2 * n
+            k, width = len(self.parameters), POSE + 2 * n
             S, V, e = (
                 by_camera.reshape(m, k, 2 * n),
                 by_pose.reshape(m, POSE, 2 * n),
@@ -136,7 +135,7 @@ class Eq7:
         (camera, poses), q = unknowns
         rotation = rotation_from_vector(views[:, :3]) @ poses.rotation
         moved = Estimate(
-            with_parameters(camera, self.free, shared), Poses(rotation, poses.translation + views[:, 3:POSE])
+            self.parameters.moved(camera, shared), Poses(rotation, poses.translation + views[:, 3:POSE])
         )
         return CorrectedPoints(moved, q + views[:, POSE:].reshape(q.shape))
 
@@ -145,25 +144,17 @@ class Eq7:
     ) -> tuple[Float[ndarray, "m k n 2"], Float[ndarray, "m 6 n 2"], Float[ndarray, "m n 2"]]:
         """d g / d K, d g / d pose and g - q; 0 in the padding."""
         (camera, poses), q = unknowns
-        m, n = self._present.shape
-        K = camera.intrinsics
         turned = self._points @ np.swapaxes(poses.rotation, 1, 2)
-        x, y, pull_back = camera.lens.chart.linearise(
-            *np.moveaxis(turned + poses.translation[:, None], -1, 0)
-        )
-        columns, g = parameter_columns(camera, x.ravel(), y.ravel(), self.free)
-        one = np.ones_like(x)
-        by_point = np.stack(
-            [np.stack(pull_back(K.fx * one, K.skew * one)), np.stack(pull_back(0.0 * one, K.fy * one))]
-        )  # (2, 3, m, n)
+        image = camera.linearise(np.moveaxis(turned + poses.translation[:, None], -1, 0), self.parameters)
+        by_point = np.array(image.by_point)  # (2, 3, m, n)
         by_turn = np.cross(np.moveaxis(turned, -1, 0)[None], by_point, axis=1)
         by_pose = np.concatenate([by_turn, by_point], axis=1).transpose(2, 1, 3, 0)
-        by_camera = columns.reshape(-1, 2, m, n).transpose(2, 0, 3, 1)
+        by_camera = image.by_parameters().transpose(2, 0, 3, 1)
         present = self._present[..., None]
         return (
             by_camera * present[:, None],
             by_pose * present[:, None],
-            (g.reshape(2, m, n).transpose(1, 2, 0) - q) * present,
+            (np.stack([image.u, image.v], axis=-1) - q) * present,
         )
 
     def _cross_ratios(self, q: Float[ndarray, "m n 2"]) -> Terms:

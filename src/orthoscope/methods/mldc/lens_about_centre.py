@@ -35,6 +35,7 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lens import Formula
 from orthoscope.models.lenses import Fet, Pfet, parse_lens
+from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import Options, Solution
 from orthoscope.solve.losses import Loss
 
@@ -155,33 +156,29 @@ def _closed_form(rays: ndarray, pixels: ndarray, camera: Camera, free: Sequence[
 def _columns(
     camera: Camera, rays: ndarray, free: Sequence[str], *, K: Intrinsics
 ) -> tuple[Float[ndarray, "k 2 n"], Float[ndarray, "2 n"]]:
-    """d(u, v) by each free parameter, and (u, v); P = L^-1 A K ray, where K is the one given and A K the
-    camera's.
-    """
-    L = _frame(camera)
-    P = np.linalg.solve(L.matrix, camera.intrinsics.matrix) @ rays.T
-    x, y, pull_back = camera.lens.chart.linearise(*P)
-    coefficients = [name for name in free if name in camera.lens.names()]
-    at = camera.lens.linearise(x, y, coefficients)
-    by_P = L.fx * np.array([pull_back(at.j_xx, at.j_xy), pull_back(at.j_yx, at.j_yy)])
-    by = {name: L.fx * np.stack(slope) for name, slope in zip(coefficients, at.by, strict=True)}
-    with_centre = camera.intrinsics.fx / K.fx * P[2] / L.fx
-    by["centre_x"] = np.array([[1.0], [0.0]]) - by_P[:, 0] * with_centre
-    by["centre_y"] = np.array([[0.0], [1.0]]) - by_P[:, 1] * with_centre
-    by["stretch"] = by_P[:, 0] * P[0] + by_P[:, 1] * P[1]
-    return np.stack([by[name] for name in free]), np.stack([L.fx * at.x + L.cx, L.fx * at.y + L.cy])
+    """d(u, v) by each free parameter, and (u, v); the camera's K is A K of the one given."""
+    image = camera.linearise(rays.T, [name for name in free if name != "stretch"])
+    by = dict(zip((name for name in free if name != "stretch"), image.by_parameters(), strict=True))
+    stretch = camera.intrinsics.fx / K.fx
+    if "stretch" in free:
+        x, y, z = np.linalg.solve(_frame(camera).matrix, camera.intrinsics.matrix) @ rays.T
+        by_x, by_y = (np.array([of_u[i], of_v[i]]) for of_u, of_v in [image.by_ray] for i in (0, 1))
+        by["stretch"] = by_x * x + by_y * y
+        for name, slope in (
+            ("centre_x", by_x),
+            ("centre_y", by_y),
+        ):  # A stretches about the centre, and moves with it
+            if name in by:
+                by[name] = by[name] + (1.0 - stretch) * slope * z / _frame(camera).fx
+    return np.stack([by[name] for name in free]), np.stack([image.u, image.v])
 
 
 def _moved(camera: Camera, free: Sequence[str], step: ndarray, *, K: Intrinsics) -> Camera:
     """The camera after a step; `stretch` steps by its logarithm."""
     steps = dict(zip(free, map(float, step), strict=True))
-    L = _frame(camera)
-    frame = Intrinsics(L.fx, L.fy, L.cx + steps.pop("centre_x", 0.0), L.cy + steps.pop("centre_y", 0.0))
     stretch = camera.intrinsics.fx / K.fx * float(np.exp(np.clip(steps.pop("stretch", 0.0), -1.0, 1.0)))
-    lens = camera.lens.with_coefficients(
-        **{name: getattr(camera.lens, name) + length for name, length in steps.items()}
-    )
-    return replace(camera, intrinsics=_stretched(K, stretch, frame), lens=lens, lens_frame=frame)
+    moved = Parameters.of(steps).moved(camera, np.array(list(steps.values())))
+    return replace(moved, intrinsics=_stretched(K, stretch, _frame(moved)))
 
 
 def _stretched(K: Intrinsics, stretch: float, centre: Intrinsics) -> Intrinsics:

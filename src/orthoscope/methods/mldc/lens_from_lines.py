@@ -18,7 +18,6 @@ import numpy as np
 
 from orthoscope.fitting.initial_camera import FIELDS
 from orthoscope.fitting.observations import Observations
-from orthoscope.fitting.reprojection import with_parameters
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, straightened_parameters
 from orthoscope.methods.mldc.line_residuals import LinesOfSight, Straightness
@@ -26,9 +25,10 @@ from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.charts import EQUIDISTANT
 from orthoscope.models.lens import Formula
+from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import Options, Solution, shared_covariance, solve
 from orthoscope.solve.losses import Cauchy, Linear, Loss
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 
 __all__ = ["StraightLens", "fit_straight_lens"]
 
@@ -60,7 +60,7 @@ class StraightLens(NamedTuple):
 
     def moved(self, step: Float[ndarray, " k"]) -> Camera:
         """The lens's own camera after a step of the free parameters."""
-        return with_parameters(self.camera, tuple(OWN_NAMES.get(name, name) for name in self.free), step)
+        return Parameters.of(OWN_NAMES.get(name, name) for name in self.free).moved(self.camera, step)
 
 
 def fit_straight_lens(

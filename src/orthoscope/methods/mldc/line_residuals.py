@@ -26,11 +26,11 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.fitting.observations import Observations
-from orthoscope.fitting.reprojection import parameter_columns, with_parameters
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.models.camera import Camera
+from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
 
@@ -40,6 +40,7 @@ FEET = (
     8  # steps towards a foot; each gains as many digits as the distance is short against the curve's radius
 )
 SETTLED = 1e-12  # radians: a foot that moves less has been found
+NOTHING = Parameters(())
 STRIDE = 0.3  # radians: a foot never moves farther at once
 
 
@@ -62,7 +63,8 @@ class Straightness:
 
     def __init__(self, observations: Observations, lines: SeenLines, free: Sequence[str]) -> None:
         line, place = np.nonzero(lines.present)
-        self.free = tuple(free)
+        self.parameters = Parameters.of(free)
+        self.free = self.parameters.names
         self._line = line
         self._first = np.searchsorted(line, np.arange(len(lines.row)))
         row, column = lines.row[line], lines.column[line, place]
@@ -97,10 +99,9 @@ class Straightness:
     def linearise(self, unknowns: LinesOfSight, loss: Loss) -> NormalEquations:
         """The solver's sums."""
         with np.errstate(all="ignore"):
-            pixels, along, across = self._curve(unknowns)
+            pixels, along, across, by_camera = self._curve(unknowns, self.parameters)
             normal = np.stack([-along[1], along[0]]) / np.hypot(*along)
-            x, y = unknowns.camera.lens.chart.flatten(*self._directions(unknowns)[0])
-            shared = (parameter_columns(unknowns.camera, x, y, self.free)[0] * normal).sum(1)
+            shared = (by_camera * normal).sum(1)
             tilt = (across * normal).sum(0)
             of_line = np.stack([tilt * np.sin(unknowns.feet), -tilt * np.cos(unknowns.feet)])
             residual = ((pixels - self.pixels) * normal).sum(0)
@@ -122,13 +123,13 @@ class Straightness:
         """The unknowns after a step, the feet where they then belong."""
         camera, frames, feet = unknowns
         turned = rotation_from_vector(np.einsum("lij,lj->li", frames[:, :, :2], views)) @ frames
-        return self._with_feet(LinesOfSight(with_parameters(camera, self.free, shared), turned, feet))
+        return self._with_feet(LinesOfSight(self.parameters.moved(camera, shared), turned, feet))
 
     def _with_feet(self, unknowns: LinesOfSight) -> LinesOfSight:
         """The same with every foot moved to the place of its curve nearest to its corner."""
         for _ in range(FEET):
             with np.errstate(all="ignore"):
-                pixels, along, _ = self._curve(unknowns)
+                pixels, along, *_ = self._curve(unknowns)
                 step = (along * (pixels - self.pixels)).sum(0) / (along * along).sum(0)
                 unknowns = unknowns._replace(feet=unknowns.feet - np.clip(step, -STRIDE, STRIDE))
             if not np.abs(step).max() > SETTLED:
@@ -144,19 +145,18 @@ class Straightness:
         return a * cosine + b * sine, b * cosine - a * sine, n
 
     def _curve(
-        self, unknowns: LinesOfSight
-    ) -> tuple[Float[ndarray, "2 n"], Float[ndarray, "2 n"], Float[ndarray, "2 n"]]:
-        """Pixels of the feet, their derivative along the curve, and when P moves along the line's normal."""
-        K, lens = unknowns.camera.intrinsics, unknowns.camera.lens
+        self, unknowns: LinesOfSight, parameters: Parameters = NOTHING
+    ) -> tuple[Float[ndarray, "2 n"], Float[ndarray, "2 n"], Float[ndarray, "2 n"], Float[ndarray, "k 2 n"]]:
+        """Pixels of the feet, their slopes along the curve, when P moves along the line's normal, by the
+        parameters.
+        """
         direction, onward, normal = self._directions(unknowns)
-        x, y, pull_back = lens.chart.linearise(*direction)
-        at = lens.linearise(x, y)
-        by_direction = (pull_back(K.fx * at.j_xx, K.fx * at.j_xy), pull_back(K.fy * at.j_yx, K.fy * at.j_yy))
+        image = unknowns.camera.linearise(direction, parameters)
         along, across = (
-            np.stack([g[0] * v[0] + g[1] * v[1] + g[2] * v[2] for g in by_direction])
+            np.stack([g[0] * v[0] + g[1] * v[1] + g[2] * v[2] for g in image.by_point])
             for v in (onward, normal)
         )
-        return np.stack([K.fx * at.x + K.cx, K.fy * at.y + K.cy]), along, across
+        return np.stack([image.u, image.v]), along, across, image.by_parameters()
 
     def _sum(self, terms: Float[ndarray, "*batch n"]) -> Float[ndarray, "*batch l"]:
         """Sums over the corners of each line."""
