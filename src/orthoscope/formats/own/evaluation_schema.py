@@ -88,10 +88,9 @@ class LensMisfitFile(FileStruct):
         return LensMisfit(self.test.core(), cells, array_of(self.residuals, self.rows, self.columns, 2))
 
 
-class CameraErrorFile(Record):
+class CameraErrorFile(FileStruct):
     """The maps are rows of the frame, top to bottom; the region is a polygon of pixels."""
 
-    CORE: ClassVar[type] = CameraError
     seen_px: Number
     frame_px: Number
     near_seen_px: Number
@@ -108,22 +107,21 @@ class CameraErrorFile(Record):
 
     @classmethod
     def of(cls, error: CameraError) -> CameraErrorFile:
-        numbers = {
-            field.name: null_for_nan(getattr(error, field.name))
-            for field in msgspec.structs.fields(cls)
-            if field.type == Number
-        }
+        numbers = {name: null_for_nan(getattr(error, name)) for name in cls._numbers()}
         region = [(float(x), float(y)) for x, y in error.region]
         return cls(far=rows_of(error.far), near=rows_of(error.near), region=region, **numbers)
 
     def core(self) -> CameraError:
-        numbers = {
-            field.name: float("nan") if getattr(self, field.name) is None else getattr(self, field.name)
-            for field in msgspec.structs.fields(self)
-            if field.type == Number
+        numbers: dict[str, Any] = {
+            name: float("nan") if getattr(self, name) is None else getattr(self, name)
+            for name in self._numbers()
         }
-        maps = {name: array_of(getattr(self, name), len(getattr(self, name)), -1) for name in ("far", "near")}
-        return CameraError(region=array_of(list(self.region), -1, 2), **maps, **numbers)
+        far, near = (array_of(rows, len(rows), -1) for rows in (self.far, self.near))
+        return CameraError(far=far, near=near, region=array_of(list(self.region), -1, 2), **numbers)
+
+    @classmethod
+    def _numbers(cls) -> list[str]:
+        return [field.name for field in msgspec.structs.fields(cls) if field.type == Number]
 
 
 class DisagreementFile(Record):
