@@ -146,7 +146,11 @@ def test_hostile_words_do_not_become_markup(ordinary, monkeypatch):
     )
     page = report_page(
         replace(
-            ordinary, calibration=calibration, verdict=words, warnings=(words,), suspects=((words, words),)
+            ordinary,
+            calibration=calibration,
+            verdict=ordinary.verdict._replace(far=words),
+            warnings=(words,),
+            suspects=((words, words),),
         )
     )
     assert "<script>" not in page
@@ -154,7 +158,7 @@ def test_hostile_words_do_not_become_markup(ordinary, monkeypatch):
 
 def test_the_page_says_the_verdict_the_suspects_the_assumptions_and_how_it_was_made(pages, every_evaluation):
     words = {kind: " ".join(" ".join(Page(page).words).split()) for kind, page in pages.items()}
-    assert every_evaluation["ordinary"].verdict in words["ordinary"]
+    assert str(every_evaluation["ordinary"].verdict) in words["ordinary"]
     assert "its error is 7 times that of the others" in words["suspicious"]
     assert every_evaluation["single"].calibration.assumptions[0] in words["single"]
     for said in (
