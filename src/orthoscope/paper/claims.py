@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["MAIN", "Claim", "Verdict", "main_headline", "share"]
+__all__ = ["MAIN", "Claim", "ClaimVerdict", "main_headline", "share"]
 
 MAIN = (
     "MLDC has a lower error on test data than FCCM, whose lens and pin-hole only compensate each other on"
@@ -19,7 +19,7 @@ MAIN = (
 )
 
 
-class Verdict(StrEnum):
+class ClaimVerdict(StrEnum):
     """Whether a claim stands."""
 
     HOLDS = "holds"
@@ -36,24 +36,24 @@ class Claim:
 
     where: str
     paper: str
-    verdict: Verdict
+    verdict: ClaimVerdict
     finding: str
 
 
-def share(number: int, of: int) -> Verdict:
+def share(number: int, of: int) -> ClaimVerdict:
     """All of them, some of them, none."""
-    return Verdict.HOLDS if number == of else Verdict.PARTLY if number else Verdict.FAILS
+    return ClaimVerdict.HOLDS if number == of else ClaimVerdict.PARTLY if number else ClaimVerdict.FAILS
 
 
 def main_headline(claims: Sequence[Claim]) -> str:
     """One sentence for the top of the page, from the claims that MLDC is the better one on test data (MAIN);
     others are passed over.
     """
-    told = [claim for claim in claims if claim.paper == MAIN and claim.verdict is not Verdict.OPEN]
+    told = [claim for claim in claims if claim.paper == MAIN and claim.verdict is not ClaimVerdict.OPEN]
     if not told:
         return "Whether MLDC is better than FCCM on test data cannot be told from this run."
-    holds = sum(claim.verdict is Verdict.HOLDS for claim in told)
-    partly = sum(claim.verdict is Verdict.PARTLY for claim in told)
+    holds = sum(claim.verdict is ClaimVerdict.HOLDS for claim in told)
+    partly = sum(claim.verdict is ClaimVerdict.PARTLY for claim in told)
     verdict = share(2 * holds + partly, 2 * len(told))
     counts = (
         f"in full in {holds} and in part in {partly} of {len(told)} comparisons"

@@ -14,7 +14,7 @@ import numpy as np
 
 from orthoscope.geometry.numbers import ABSENT
 from orthoscope.methods import METHODS
-from orthoscope.paper.claims import Claim, Verdict, main_headline
+from orthoscope.paper.claims import Claim, ClaimVerdict, main_headline
 from orthoscope.paper.curves import curves_of
 from orthoscope.paper.entries import FCCM
 from orthoscope.paper.figures_with_claims import (
@@ -67,7 +67,7 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         summary=_summary(every),
         counts=[
             (verdict.value, number, _tone(verdict))
-            for verdict in Verdict
+            for verdict in ClaimVerdict
             if (number := _count(every, verdict))
         ],
         failures=_failures(results),
@@ -148,11 +148,11 @@ def _summary(every: list[Claim]) -> list[tuple[str, list[Claim]]]:
     ]
 
 
-def _count(every: list[Claim], verdict: Verdict) -> int:
+def _count(every: list[Claim], verdict: ClaimVerdict) -> int:
     return sum(claim.verdict is verdict for claim in every)
 
 
-def _tone(verdict: Verdict) -> str:
+def _tone(verdict: ClaimVerdict) -> str:
     """The class of a verdict's chip."""
     return verdict.name.lower()
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["each_of", "listed", "short_number", "span", "times"]
+__all__ = ["each_of", "joined_words", "short_number", "span", "times"]
 
 DECIMALS = ((0.1, 3), (10.0, 2), (1e4, 0))  # below this size, so many
 
@@ -28,14 +28,14 @@ def span(values: Float[ndarray, " n"], *, decimals: int | None = None) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def listed(words: Sequence[str]) -> str:
+def joined_words(words: Sequence[str]) -> str:
     """One, two and three."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
 def each_of(values: Mapping[str, float]) -> str:
     """A number for each name."""
-    return listed([f"{short_number(value)} for {name}" for name, value in values.items()])
+    return joined_words([f"{short_number(value)} for {name}" for name, value in values.items()])
 
 
 def times(mine: float, theirs: float) -> str:
