@@ -1,5 +1,6 @@
 # make demo    the main job, with photographs that it renders itself
-# make test    the tests
+# make test    the tests, without the slow ones
+# make test-all all of them
 # make picture the picture in README.md, from the demo
 # make check   all that CI checks: format, lint, types, rooms, tests
 # make bench   this project beside its peers; ONLY=solving runs that part (benchmarks/README.md)
@@ -8,18 +9,18 @@ VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: release-check demo test quick check format lint types rooms picture bench bench-peers clean
+.PHONY: release-check demo test test-all check format lint types rooms picture bench bench-peers clean
 
 demo: $(VENV)/installed
 	$(BIN)/orthoscope demo -o demo
 
 test: $(VENV)/installed
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
 
-quick: $(VENV)/installed
-	$(BIN)/pytest -n auto -m "not slow"
+test-all: $(VENV)/installed
+	$(BIN)/pytest -n auto --dist worksteal
 
-check: lint types rooms test
+check: lint types rooms test-all
 
 lint: $(VENV)/installed
 	$(BIN)/ruff format --check

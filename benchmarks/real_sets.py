@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
-from orthoscope.targets.detections import Detections, Target, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target, chessboard
 
 __all__ = ["SETS", "RealSet", "babel_cube", "classic_corners", "datasets", "zhang"]
 

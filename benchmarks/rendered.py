@@ -14,7 +14,7 @@ from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import Brown
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import Scene, random_views
-from orthoscope.targets.detections import chessboard
+from orthoscope.targets.target import chessboard
 
 __all__ = ["Condition", "Photographs", "rendered"]
 

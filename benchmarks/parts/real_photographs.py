@@ -17,7 +17,8 @@ from benchmarks.rows import Part, Row
 from orthoscope.files.images import photographs, read_image
 from orthoscope.geometry.arrays import CalibrationError, ndarray
 from orthoscope.methods.fccm import fccm
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 __all__ = ["real_photographs"]
 

@@ -16,7 +16,8 @@ from benchmarks.rows import Part, Row
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 __all__ = ["COUNTS", "ROUNDS", "scene_file", "solving"]
 

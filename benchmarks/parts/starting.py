@@ -17,7 +17,8 @@ from benchmarks.real_sets import datasets
 from benchmarks.rows import Part, Row
 from orthoscope.formats.corners_vnl import write_vnl
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 __all__ = ["starting"]
 

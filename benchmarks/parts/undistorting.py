@@ -22,7 +22,7 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
 from orthoscope.simulation.render import photographs
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import chessboard
+from orthoscope.targets.target import chessboard
 
 __all__ = ["undistorting"]
 

@@ -13,7 +13,7 @@ from served import serve, timed
 
 from orthoscope import METHODS, Calibration, Camera, Detections, Intrinsics, View
 from orthoscope.models.lenses import Brown
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 from orthoscope.version import __version__
 
 SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {  # what is called for each name that the parts use

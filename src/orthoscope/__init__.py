@@ -33,11 +33,13 @@ if TYPE_CHECKING:
     from orthoscope.fitting.held_out import held_out as held_out
     from orthoscope.fitting.resection import resect as resect
     from orthoscope.formats.export import export as export
+    from orthoscope.formats.load import load_camera as load_camera
     from orthoscope.formats.own.json import load as load
     from orthoscope.formats.own.json import load_calibration as load_calibration
-    from orthoscope.formats.own.json import load_camera as load_camera
     from orthoscope.formats.own.json import load_detections as load_detections
+    from orthoscope.formats.own.json import load_evaluation as load_evaluation
     from orthoscope.formats.own.json import save as save
+    from orthoscope.formats.table import FORMATS as FORMATS
     from orthoscope.geometry.arrays import CalibrationError as CalibrationError
     from orthoscope.geometry.arrays import InputError as InputError
     from orthoscope.geometry.pose import Pose as Pose
@@ -58,10 +60,10 @@ if TYPE_CHECKING:
     from orthoscope.targets.detections import Detections as Detections
     from orthoscope.targets.detections import Outlier as Outlier
     from orthoscope.targets.detections import SetAside as SetAside
-    from orthoscope.targets.detections import Target as Target
     from orthoscope.targets.detections import View as View
-    from orthoscope.targets.detections import chessboard as chessboard
-    from orthoscope.targets.detections import parse_target as parse_target
+    from orthoscope.targets.table import parse_target as parse_target
+    from orthoscope.targets.target import Target as Target
+    from orthoscope.targets.target import chessboard as chessboard
 
 ROOMS = {
     "detection.detect": ("detect",),
@@ -73,7 +75,9 @@ ROOMS = {
     "fitting.held_out": ("held_out",),
     "fitting.resection": ("resect",),
     "formats.export": ("export",),
-    "formats.own.json": ("load", "load_calibration", "load_camera", "load_detections", "save"),
+    "formats.load": ("load_camera",),
+    "formats.own.json": ("load", "load_calibration", "load_detections", "load_evaluation", "save"),
+    "formats.table": ("FORMATS",),
     "geometry.arrays": ("CalibrationError", "InputError"),
     "geometry.pose": ("Pose",),
     "methods": ("METHODS", "calibrate"),
@@ -86,15 +90,9 @@ ROOMS = {
     "simulation.render": ("render",),
     "simulation.scene": ("Scene", "random_views", "simulate_detections"),
     "straight.undistort": ("undistort",),
-    "targets.detections": (
-        "Detections",
-        "Outlier",
-        "SetAside",
-        "Target",
-        "View",
-        "chessboard",
-        "parse_target",
-    ),
+    "targets.detections": ("Detections", "Outlier", "SetAside", "View"),
+    "targets.table": ("parse_target",),
+    "targets.target": ("Target", "chessboard"),
 }
 _ROOM_OF = {name: room for room, names in ROOMS.items() for name in names}
 

@@ -18,7 +18,7 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
 from orthoscope.simulation.render import Renderer, photographs
 from orthoscope.simulation.scene import Scene, random_views
-from orthoscope.targets.detections import chessboard
+from orthoscope.targets.target import chessboard
 
 
 class Run(NamedTuple):

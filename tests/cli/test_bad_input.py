@@ -63,6 +63,7 @@ def test_a_wrong_command_says_so_and_leaves_with_2(run, tmp_path, monkeypatch, a
     assert sorted(path.name for path in tmp_path.iterdir()) == ["corners.vnl"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [
@@ -82,27 +83,32 @@ def test_an_unknown_name_lists_the_known_ones(run, calibrated, tmp_path, options
     assert not (tmp_path / "out/calibration.json").exists()
 
 
+@pytest.mark.slow
 def test_spoilt_photographs_are_set_aside_and_named(run, folder, tmp_path):
     (folder / "view02.png").write_bytes(b"")
     (folder / "view03.png").write_bytes(b"this is no image at all")
     whole = (folder / "view04.png").read_bytes()
     (folder / "view04.png").write_bytes(whole[: len(whole) // 2])
     (folder / "view05.png").write_bytes((folder / "view06.png").read_bytes())
-    numbers = json.loads(calibrate(run, folder, "--target", TARGET, "--json", out=tmp_path / "out").out)
-    reasons = {entry["name"]: entry["reason"] for entry in numbers["views_rejected"]}
+    calibrate(run, folder, "--target", TARGET, out=tmp_path / "out")
+    detections = load_detections(tmp_path / "out/detections.json")
+    reasons = dict(detections.set_aside)
     assert set(reasons) == {"view02.png", "view03.png", "view04.png", "view06.png"}
     assert "view05.png" in reasons["view06.png"]
-    assert numbers["views_used"] == 6
+    assert len(detections.views) == 6
 
 
+@pytest.mark.slow
 def test_the_minority_of_image_sizes_is_set_aside_and_named(run, folder, tmp_path):
     small = cv2.resize(cv2.imread(str(folder / "view01.png")), (320, 240))
     cv2.imwrite(str(folder / "view01.png"), small)
-    numbers = json.loads(calibrate(run, folder, "--target", TARGET, "--json", out=tmp_path / "out").out)
-    assert [entry["name"] for entry in numbers["views_rejected"]] == ["view01.png"]
-    assert "320x240" in numbers["views_rejected"][0]["reason"]
+    calibrate(run, folder, "--target", TARGET, out=tmp_path / "out")
+    (aside,) = load_detections(tmp_path / "out/detections.json").set_aside
+    assert aside.image == "view01.png"
+    assert "320x240" in aside.reason
 
 
+@pytest.mark.slow
 def test_a_target_that_does_not_match_is_told_which_size_seems_to_be_there(run, photos, tmp_path):
     told = calibrate(run, photos, "--target", "chessboard:10x7:25mm", out=tmp_path / "out")
     assert told.code == 1

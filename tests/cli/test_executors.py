@@ -186,7 +186,7 @@ def test_verbs_give_the_same_files_on_a_cluster_as_here(run, dask, photos, calib
             run("undistort", calibrated / "calibration.json", photos, *where, "-o", out / "straight").code
             == 0
         )
-        judged = run("evaluate", calibrated / "calibration.json", "--json", *where)
+        judged = run("evaluate", calibrated / "calibration.json", "--folds", 5, "--json", *where)
         assert judged.code == 0
         (out / "evaluation.json").write_text(judged.out)
     here, there = (

@@ -23,6 +23,7 @@ def beside_photos(photos, tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_its_python_runs_and_leaves_what_it_says(beside_photos, capsys):
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     exec(compile(code, "README.md", "exec"), {})
@@ -30,6 +31,7 @@ def test_its_python_runs_and_leaves_what_it_says(beside_photos, capsys):
     assert (beside_photos / "calibration.json").is_file()
 
 
+@pytest.mark.slow
 def test_its_command_runs(run, beside_photos):
     (command,) = re.findall(r"^orthoscope (.*)$", README, re.MULTILINE)
     assert run(*shlex.split(command)).code == 0

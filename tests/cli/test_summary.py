@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orthoscope.cli.summary import evaluation_lines, evaluation_numbers
+from orthoscope.cli.summary import evaluation_lines
 from orthoscope.evaluation.evaluate import Evaluation, evaluate
 from orthoscope.methods.fccm import fccm
 from orthoscope.simulation.scene import paper_scene, simulate_detections
@@ -46,8 +46,3 @@ def test_corners_left_out_are_counted_and_their_photographs_named(evaluation: Ev
 
 def test_where_no_corner_is_left_out_nothing_is_said(evaluation: Evaluation):
     assert not [line for line in evaluation_lines(evaluation) if line.startswith("outliers")]
-
-
-def test_for_machines_every_corner_left_out_has_its_reason(evaluation: Evaluation):
-    (told,) = evaluation_numbers(with_outliers(evaluation, OUTLIERS[:1]))["corners_left_out"]
-    assert told == {"image": "00.jpg", "id": 0, "pixel": (1.0, 2.0), "reason": "9.0 px off"}

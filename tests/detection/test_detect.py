@@ -20,7 +20,8 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import random_views
-from orthoscope.targets.detections import Detections, Target, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target, chessboard
 
 BOARD = chessboard(9, 6, 0.025)
 CAMERAS = {
@@ -73,6 +74,7 @@ def test_blur_noise_and_uneven_light_cost_little(look):
         assert rms_to(truth, corners) < 0.06  # noise 8 gives 0.04; the rest stay below 0.02
 
 
+@pytest.mark.slow
 def test_a_large_photograph_is_refined_as_well_as_a_small_one():
     camera = Camera((3000, 2250), Intrinsics(2400.0, 2400.0, 1500.0, 1120.0), Brown(k1=-0.1))
     ((grey, truth),) = photographed(camera, 1)

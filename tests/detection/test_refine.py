@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from orthoscope.detection.grid import grid_shape, nearest_neighbour, one_line_more
+from orthoscope.detection.grid import grid_shape, lattice, nearest_neighbour, one_line_more
 from orthoscope.detection.refine import refined
 from orthoscope.detection.saddle import fit_saddles
 
@@ -83,7 +83,7 @@ def circles(columns: int = 9, rows: int = 6, radius: float = 400.0):
 
 def test_a_grid_of_arcs_has_their_curvature_and_straight_columns():
     corners, radius = circles()
-    shape = grid_shape(corners, 9, 6)
+    shape = grid_shape(corners, lattice(9, 6))
     assert_allclose(
         shape.bend_along, 1.0 / radius, rtol=0.01
     )  # towards +90 degrees of x, which is down, where the centre is
@@ -94,12 +94,12 @@ def test_a_grid_of_arcs_has_their_curvature_and_straight_columns():
 def test_a_corner_that_was_mistaken_strays():
     corners, _ = circles()
     corners[22] += 12.0
-    assert grid_shape(corners, 9, 6).stray.argmax() == 22
+    assert grid_shape(corners, lattice(9, 6)).stray.argmax() == 22
 
 
 def test_the_nearest_neighbour_is_along_the_shorter_side():
     corners = np.stack(np.meshgrid(np.arange(4) * 10.0, np.arange(3) * 7.0), axis=-1).reshape(-1, 2)
-    assert_allclose(nearest_neighbour(corners, 4, 3), 7.0)
+    assert_allclose(nearest_neighbour(corners, lattice(4, 3)), 7.0)
 
 
 def test_a_line_more_goes_on_as_the_last_ones_do():
@@ -111,6 +111,6 @@ def test_a_line_more_goes_on_as_the_last_ones_do():
 def test_a_picture_that_is_no_board_leaves_every_corner_near_where_it_was():
     corners, _ = circles()
     noise = np.random.default_rng(0).integers(0, 256, (480, 640), dtype=np.uint8)
-    moved = refined(noise, corners, 9, 6) - corners
+    moved = refined(noise, corners, lattice(9, 6)).pixels - corners
     assert np.isfinite(moved).all()
     assert np.hypot(*moved.T).max() < 0.5 * 30  # half a square

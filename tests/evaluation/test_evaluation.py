@@ -103,6 +103,7 @@ def test_a_lens_that_folds_over_inside_the_data_is_not_to_be_trusted():
     )
 
 
+@pytest.mark.slow
 def test_a_lens_with_too_many_coefficients_for_its_corners_has_learnt_the_photographs():
     detections = photographed(6, noise_px=0.5)
     rng = np.random.default_rng(0)
@@ -179,6 +180,7 @@ def small_boards_but_for(empty: tuple[int, int]) -> Detections:
     return simulate_detections(Scene(CAMERA, BOARD, tuple(poses)), noise_px=0.02, rng=rng)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("empty", NINTHS, ids=NINTHS.values())
 def test_the_place_that_no_photograph_covers_is_named(empty):
     evaluation = evaluate(fccm(small_boards_but_for(empty), lens="brown:k1"), folds=2)

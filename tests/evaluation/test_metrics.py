@@ -12,7 +12,8 @@ from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.models.camera import WIDEST, Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 PINHOLE = Camera((640, 480), Intrinsics(500.0, 500.0, 320.0, 240.0), Brown())
 BOARD = chessboard(9, 6, 0.025)

@@ -26,6 +26,7 @@ def test_calibrate_calls_the_method_with_its_settings():
     assert by_name.camera.intrinsics.as_tuple() == by_hand.camera.intrinsics.as_tuple()
 
 
+@pytest.mark.slow
 def test_every_method_says_its_name_and_can_be_called_again_from_its_settings():
     for name in METHODS:
         first = calibrate(DETECTIONS, method=name)

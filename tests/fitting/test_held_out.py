@@ -119,6 +119,7 @@ def test_errors_that_are_no_calibration_errors_are_not_swallowed():
     assert np.isnan(held_out(TEN, unable).rms_px)
 
 
+@pytest.mark.slow
 def test_where_the_lens_has_too_many_coefficients_the_held_out_error_is_larger_than_the_training_error():
     ratios = []
     for seed in range(3):

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from orthoscope.formats.corners_vnl import read_vnl, write_vnl
 from orthoscope.geometry.arrays import InputError
-from orthoscope.targets.detections import Detections, SetAside, View, chessboard
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.target import chessboard
 
 SIZE = (640, 480)
 BOARD = chessboard(3, 2, 0.1)

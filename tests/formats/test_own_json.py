@@ -23,7 +23,8 @@ from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
-from orthoscope.targets.detections import Detections, Outlier, SetAside, Target, View, chessboard
+from orthoscope.targets.detections import Detections, Outlier, SetAside, View
+from orthoscope.targets.target import Target, chessboard
 
 BOARD = chessboard(4, 3, 0.025)
 CAMERA = Camera((640, 480), Intrinsics(500.1, 501.3, 1 / 3, 240.0, 0.1), Brown(k1=-0.2, p1=1e-17))

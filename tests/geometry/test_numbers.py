@@ -12,7 +12,9 @@ from orthoscope.geometry.numbers import (
     pixels,
     probability,
     setting,
+    six_digits,
     value_with_deviation,
+    with_error,
 )
 
 
@@ -44,6 +46,25 @@ def test_pixels_have_about_three_digits(value, text):
 )
 def test_a_value_ends_where_its_deviation_has_its_second_digit(value, deviation, texts):
     assert value_with_deviation(value, deviation) == texts
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.0881, 0.0152, "0.088 ± 0.015"),
+        (0.0012, 0.0004, "0.00120 ± 0.00040"),
+        (9.1, 0.8, "9.10 ± 0.80"),
+        (0.2, np.nan, "0.200"),
+        (0.2, 0.0, "0.200"),
+        (np.nan, 0.1, ABSENT),
+    ],
+)
+def test_a_number_ends_where_its_error_has_its_second_digit(value, error, text):
+    assert with_error(value, error) == text
+
+
+def test_a_parameter_whose_error_nobody_knows_has_six_digits():
+    assert with_error(535.915731, np.nan, alone=six_digits) == "535.916"
 
 
 def test_angles_and_shares_that_do_not_exist_are_dashes():

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.geometry.projective import homographies_to_pixels, homographies_to_rays
-from orthoscope.targets.detections import chessboard
+from orthoscope.targets.target import chessboard
 
 BOARD = chessboard(9, 6, 0.025).points[:, :2]
 K = np.array([[700.0, 0.5, 320.0], [0.0, 710.0, 240.0], [0.0, 0.0, 1.0]])

@@ -9,7 +9,8 @@ import numpy as np
 from helpers.scenes import BOARD
 from orthoscope.models.camera import Camera
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, Target
+from orthoscope.targets.detections import Detections
+from orthoscope.targets.target import Target
 
 __all__ = ["bowed", "drawn", "photographed_with", "stretched"]
 

@@ -11,7 +11,8 @@ from orthoscope.fitting.calibration import Calibration, Uncertainty
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, Target, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target, chessboard
 
 __all__ = [
     "BOARD",

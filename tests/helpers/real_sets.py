@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from orthoscope.targets.detections import Detections, Target, View
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target
 
 __all__ = ["CLASSIC", "babel_cube", "classic", "zhang"]
 

@@ -15,7 +15,8 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 __all__ = [
     "BOARD",

@@ -46,7 +46,8 @@ from orthoscope.models.lenses import (
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import solve
 from orthoscope.solve.losses import Linear
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 FINE = chessboard(14, 10, 0.016)
 DENSE = simulate_detections(
@@ -75,6 +76,7 @@ def described(lens: Lens) -> str:
     return f"{lens_name(lens)}:{','.join(dict.fromkeys([*lens.free, *used]))}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in LENSES_TO_TRY if name not in NOT_RECOVERED])
 def test_without_noise_the_image_of_every_lens_comes_back(name):
     camera = camera_with(LENSES_TO_TRY[name])
@@ -270,6 +272,7 @@ def test_three_views_assume_nothing():
 # ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lens", LENSES)
 @pytest.mark.parametrize("noise_px", [0.0, 0.1])
 def test_views_that_are_all_parallel_to_the_image_are_refused_with_any_lens(lens, noise_px):
@@ -411,6 +414,7 @@ def test_progress_is_told_and_the_step_limit_is_said():
 # -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_standard_deviations_are_the_scatter_over_repeated_photographs():
     poses = random_views(NARROW, BOARD, 6, rng=np.random.default_rng(0))
     found = [fccm(seen(NARROW, poses, noise_px=0.2, seed=seed), lens="brown:k1,k2") for seed in range(30)]

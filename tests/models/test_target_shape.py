@@ -12,7 +12,7 @@ from scipy.stats import ortho_group
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
-from orthoscope.targets.detections import chessboard
+from orthoscope.targets.target import chessboard
 
 POINTS = chessboard(9, 6, 0.025).points
 ALL = np.ones(len(POINTS), dtype=bool)

@@ -21,7 +21,7 @@ from orthoscope.paper.photographs import SPLITS, obliqueness, split
 from orthoscope.paper.section4 import Plan, run
 from orthoscope.simulation.render import photographs
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import chessboard
+from orthoscope.targets.target import chessboard
 
 LEAST = Plan.quick(trials=1)
 CURVES = ["method", "training_nce", "test_nce", "test_nce_standard_error", "trials", "failures"]

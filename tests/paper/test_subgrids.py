@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from orthoscope.paper.subgrids import ids_of_subgrid, on_subgrid, subgrids
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 BOARD = chessboard(14, 20, 0.014)
 

@@ -14,7 +14,8 @@ from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
-from orthoscope.targets.detections import Detections, SetAside, Target, View, chessboard
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.target import Target, chessboard
 
 NOISE = 0.15  # px per coordinate
 PRINT = np.stack(

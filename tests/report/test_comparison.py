@@ -26,7 +26,12 @@ REASON = "no photograph shows <3> corners of a row & column"
 
 
 def unable(calibration, failure: str = REASON) -> Standing:
-    return Standing(Entry("nmldc:<pfet>", "nmldc", {}), np.full(14, np.nan), calibration, failure=failure)
+    return Standing(
+        Entry("nmldc:<pfet>", "nmldc", {}),
+        np.full(14, np.nan),
+        calibration and calibration.camera,
+        failure=failure,
+    )
 
 
 def standing(calibration, name: str, held_out_px: float, loses_px: float) -> Standing:
@@ -40,7 +45,9 @@ def standing(calibration, name: str, held_out_px: float, loses_px: float) -> Sta
     return Standing(
         Entry(name, "fccm", {}),
         np.ones(14),
-        calibration,
+        calibration.camera,
+        calibration.target_shape,
+        "brown",
         held_out_px,
         0.05 * held_out_px,
         loses_px,
@@ -122,7 +129,7 @@ def test_a_row_says_who_is_best_who_is_as_good_and_what_is_not_known(far):
     close = replace(second, loses_error_px=0.05)
     table = rows(replace(far, standings=(first, close, third, *far.standings[3:])))
     assert [row.verdict for row in table] == ["best", "as good", "", ""]
-    assert table[0][:8] == ("fccm:lens0", "best", "0.120 ± 0.006", ABSENT, "0.300", "0.108", "9", "0.01")
+    assert table[0][:8] == ("fccm:lens0", "best", "0.1200 ± 0.0060", ABSENT, "0.300", "0.108", "9", "0.01")
     assert table[1].loses == "0.070 ± 0.050"
     assert (table[0].lens, table[0].shape) == ("brown", "flat")
     assert set(table[3][2:10]) == {ABSENT}

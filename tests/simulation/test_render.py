@@ -27,7 +27,7 @@ from orthoscope.simulation.render import (
     render,
 )
 from orthoscope.simulation.scene import Scene, random_views
-from orthoscope.targets.detections import Target, chessboard
+from orthoscope.targets.target import Target, chessboard
 
 BARE: dict[str, Any] = {"blur_px": 0.0, "vignetting": 0.0, "noise": 0.0, "light": 0.0}
 CAMERAS = {
@@ -219,9 +219,9 @@ def test_settings_out_of_range_are_named(wrong):
         render(PIN_HOLE, BOARD, facing(0.0, 0.0, 1.0), **wrong)
 
 
-def test_only_a_full_chessboard_can_be_drawn():
+def test_what_is_known_by_its_points_only_cannot_be_drawn():
     points = Target("a few corners", BOARD.points[:5])
-    with pytest.raises(InputError, match="'a few corners' is no full chessboard"):
+    with pytest.raises(InputError, match="'a few corners' is known by its points only"):
         render(PIN_HOLE, points, facing(0.0, 0.0, 1.0))
 
 

@@ -20,7 +20,7 @@ from orthoscope.simulation.scene import (
     random_views,
     simulate_detections,
 )
-from orthoscope.targets.detections import Target, chessboard
+from orthoscope.targets.target import Target, chessboard
 
 CAMERAS = {
     "narrow, 24 degrees": Camera((1280, 1024), Intrinsics(3000.0, 3000.0, 650.0, 500.0), Brown(k1=-0.1)),

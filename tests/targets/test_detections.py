@@ -7,16 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from orthoscope.geometry.arrays import InputError, frozen, normalised
-from orthoscope.targets.detections import (
-    Detections,
-    Outlier,
-    SetAside,
-    Target,
-    View,
-    chessboard,
-    parse_length,
-    parse_target,
-)
+from orthoscope.targets.detections import Detections, Outlier, SetAside, View
+from orthoscope.targets.lengths import parse_length
+from orthoscope.targets.table import parse_target
+from orthoscope.targets.target import Target, chessboard
 
 BOARD = chessboard(9, 6, 0.025)
 

@@ -16,7 +16,8 @@ from orthoscope.cli.compare import compare
 from orthoscope.cli.demo import demo
 from orthoscope.cli.detect import detect
 from orthoscope.cli.evaluate import evaluate
-from orthoscope.cli.export import export
+from orthoscope.cli.export import convert, export, tools
+from orthoscope.cli.given_files import keeping_inputs
 from orthoscope.cli.paper import paper
 from orthoscope.cli.report import report
 from orthoscope.cli.simulate import simulate
@@ -39,7 +40,22 @@ def verbs() -> None:
     """Photographs of a flat target in, a camera that can be trusted out."""
 
 
-for verb in (calibrate, detect, evaluate, compare, undistort, export, report, simulate, demo, paper):
+for verb in (
+    calibrate,
+    detect,
+    evaluate,
+    compare,
+    undistort,
+    export,
+    convert,
+    tools,
+    report,
+    simulate,
+    demo,
+    paper,
+):
+    assert verb.callback, "a verb does something"
+    verb.callback = keeping_inputs(verb.callback)
     verbs.add_command(verb)
 
 

@@ -24,7 +24,7 @@ Example:
   target     free: corners 0.12 mm rms from where they are said to be, 0.37 mm from the lowest to the highest
   choice     target free, lens free; next target free, lens brown loses 0.004 px held out
   verdict    0.09 ± 0.01 px on photographs that were not used (0.07 px on those that were); it holds over 71 % of the frame.
-  wrote      camera/detections.json, camera/calibration.json, camera/report.html
+  wrote      camera/detections.json, camera/calibration.json, camera/evaluation.json, camera/report.html
 
 \b
 PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
@@ -54,10 +54,10 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 )
 @click.option(
     "--export",
-    metavar="TOOL",
+    type=options.TOOL,
     help=(
-        "Also write the camera for opencv, ros or kalibr, into OUT/camera-TOOL.yaml; --lens auto then takes a"
-        " lens that the tool has."
+        "Also write the camera for a tool (`orthoscope tools` lists them), into OUT/camera-TOOL; --lens auto then"
+        " takes a lens that the tool has."
     ),
 )
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
@@ -92,11 +92,12 @@ def calibrate_into(
     """The main job; prints the summary and returns the evaluation."""
     from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.inputs import detections_from
+    from orthoscope.cli.judged import EVALUATION
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
+    from orthoscope.cli.summary import evaluation_lines
     from orthoscope.evaluation.evaluate import evaluate
     from orthoscope.files.whole_files import check_folder
-    from orthoscope.formats.own.json import save
+    from orthoscope.formats.own.json import save, text_of
     from orthoscope.methods import calibrate as run
     from orthoscope.methods import settings_of
 
@@ -116,16 +117,17 @@ def calibrate_into(
         calibration = run(detections, method=method, **given, **told)
     with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
         evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
-    save(calibration, out / "calibration.json")
-    written.append(out / "calibration.json")
+    for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION)):
+        save(thing, out / name)
+        written.append(out / name)
     if export:
-        written.append(_write_for(export, calibration, out))
+        written += _write_for(export, calibration, out)
     if report:
         written.append(_write_report(evaluation, files, out, keep=keep))
     if undistort:
         written.append(_write_straight(evaluation, files, out, keep=keep, jobs=jobs, cluster=cluster))
     if as_json:
-        click.echo(to_json(evaluation_numbers(evaluation)))
+        click.echo(text_of(evaluation), nl=False)
     else:
         click.echo("\n".join([*evaluation_lines(evaluation), "wrote      " + ", ".join(map(str, written))]))
     return evaluation
@@ -135,20 +137,20 @@ def _lenses_of(tool: str | None) -> tuple[str, ...]:
     """The lenses that a tool has; none where no tool is named."""
     if tool is None:
         return ()
-    from orthoscope.formats.export import EXPORTERS
-    from orthoscope.geometry.arrays import InputError
+    from orthoscope.formats.table import tool as record
 
-    if tool not in EXPORTERS:
-        raise InputError(f"no file for {tool!r} can be written; expected one of {', '.join(EXPORTERS)}.")
-    return EXPORTERS[tool].lenses
+    return record(tool).lenses
 
 
-def _write_for(tool: str, calibration: Any, out: Path) -> Path:
-    from orthoscope.formats.export import export, exportable
+def _write_for(tool: str, calibration: Any, out: Path) -> list[Path]:
+    """Write the camera for a tool, and say what that costs."""
+    from orthoscope.formats.export import export
+    from orthoscope.formats.table import FORMATS
 
-    path = out / f"camera-{tool}.yaml"
-    export(exportable(calibration.camera, tool, made_from=calibration).camera, path, tool)
-    return path
+    exported = export(calibration, out / f"camera-{tool}{FORMATS[tool].suffixes[0]}", tool, anyway=True)
+    for remark in exported.remarks():
+        click.echo(f"{tool:<10} {remark}", err=True)
+    return list(exported.files)
 
 
 def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str) -> Path:

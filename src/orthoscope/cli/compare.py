@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from orthoscope.cli import options
 
 if TYPE_CHECKING:
-    from orthoscope.evaluation.comparison.compare import Comparison, Standing
+    from orthoscope.evaluation.comparison.compare import Comparison
 
 __all__ = ["compare"]
 
@@ -25,7 +25,7 @@ Example:
   verdict    decoupled foresees these photographs best: 0.088 ± 0.015 px on those that were not used.
              As good, for all that chance allows to say: decoupled:brown (loses 0.002 ± 0.002 px).
              The next, fccm:brown, loses 0.085 ± 0.011 px.
-  wrote      comparison/compare.json, comparison/compare.html, comparison/compare.svg
+  wrote      comparison/comparison.json, comparison/comparison.html, comparison/comparison.svg
 
 \b
 WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or decoupled:brown:target=flat.
@@ -76,10 +76,10 @@ def compare(
     from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import to_json
     from orthoscope.evaluation.comparison.compare import compare as judge
     from orthoscope.evaluation.comparison.entry import USUAL, parse_entry
     from orthoscope.files.whole_files import check_folder, write_text
+    from orthoscope.formats.own.json import text_of
     from orthoscope.report.comparison import comparison_page, comparison_svg
 
     check_folder(out)
@@ -90,16 +90,16 @@ def compare(
         )
     with processes(jobs or 1, cluster) as executor, bar("comparing") as progress:
         comparison = judge(detections, entries, folds=folds, executor=executor, progress=progress)
-    numbers = to_json(_numbers(comparison))
     texts = {
-        "compare.json": numbers + "\n",
-        "compare.html": comparison_page(comparison),
-        "compare.svg": comparison_svg(comparison),
+        "comparison.json": text_of(comparison),
+        "comparison.html": comparison_page(comparison),
+        "comparison.svg": comparison_svg(comparison),
     }
     for name, text in texts.items():
         write_text(out / name, text)
     written = "wrote      " + ", ".join(str(out / name) for name in texts)
-    click.echo(numbers if as_json else "\n".join([*_lines(comparison), written]))
+    told = texts["comparison.json"] if as_json else "\n".join([*_lines(comparison), written]) + "\n"
+    click.echo(told, nl=False)
 
 
 def _lines(comparison: Comparison) -> list[str]:
@@ -153,46 +153,3 @@ def _table(comparison: Comparison) -> list[str]:
         ).rstrip()
         for row in cells
     ]
-
-
-def _numbers(comparison: Comparison) -> dict[str, Any]:
-    """All of it as one object for machines; what is not known is None."""
-    from orthoscope.evaluation.comparison.conclusions import conclusions
-    from orthoscope.version import __version__
-
-    used = comparison.detections
-    return {
-        "version": __version__,
-        "target": used.target.name,
-        "image_size": list(used.image_size),
-        "corners": used.corners,
-        "folds": comparison.folds,
-        "views": [{"name": view.image, "corners": len(view.ids)} for view in used.views],
-        "views_rejected": [{"name": entry.image, "reason": entry.reason} for entry in used.set_aside],
-        "corners_left_out": [outlier._asdict() for outlier in used.outliers],
-        "compared": [_standing(standing, comparison) for standing in comparison.standings],
-        "conclusions": list(conclusions(comparison)),
-    }
-
-
-def _standing(standing: Standing, comparison: Comparison) -> dict[str, Any]:
-    corners = [len(view.ids) for view in comparison.detections.views]
-    return {
-        "name": standing.entry.name,
-        "method": standing.entry.method,
-        "settings": dict(standing.entry.settings),
-        "held_out_rms_px": standing.held_out_px,
-        "held_out_error_px": standing.error_px,
-        "loses_px": standing.loses_px,
-        "loses_error_px": standing.loses_error_px,
-        "nce": standing.nce,
-        "rms_px": standing.rms_px,
-        "parameters": standing.parameters,
-        "seconds": standing.seconds,
-        "lens": standing.lens or None,
-        "target": standing.shape or None,
-        "failure": standing.failure or None,
-        "views_held_out_rms_px": [
-            float((total / n) ** 0.5) for total, n in zip(standing.squares, corners, strict=True)
-        ],
-    }

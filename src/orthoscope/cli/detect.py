@@ -46,9 +46,8 @@ def detect(
     from orthoscope.cli.executors import threads
     from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import to_json
     from orthoscope.files.whole_files import check_folder
-    from orthoscope.formats.own.json import save
+    from orthoscope.formats.own.json import save, text_of
 
     check_folder(out.parent)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
@@ -59,18 +58,7 @@ def detect(
     width, height = detections.image_size
     used, aside = detections.views, detections.set_aside
     if as_json:
-        views = [{"name": view.image, "corners": len(view.ids)} for view in used]
-        rejected = [{"name": entry.image, "reason": entry.reason} for entry in aside]
-        click.echo(
-            to_json(
-                {
-                    "image_size": [width, height],
-                    "corners": detections.corners,
-                    "views": views,
-                    "views_rejected": rejected,
-                }
-            )
-        )
+        click.echo(text_of(detections), nl=False)
         return
     click.echo(
         f"views      {len(used)} of {len(used) + len(aside)} photographs, {detections.corners} corners,"

@@ -17,6 +17,7 @@ Examples:
   views      5 used; 270 corners
   rms        0.158 px per point, camera fixed, poses fitted
   NCE        0.357 (1 is what rounding to whole pixels would give)
+  $ orthoscope evaluate camera_info.yaml --on photos/ --target chessboard:9x6:25mm
 
 \b
 Other photographs show the calibration's own board, whose estimated shape is used;
@@ -25,7 +26,7 @@ with --target they show that one, taken as it is said to be.
 
 
 @click.command(epilog=EXAMPLE)
-@options.calibration_file
+@click.argument("calibration", metavar="CAMERA")
 @click.option(
     "--on",
     "others",
@@ -35,43 +36,56 @@ with --target they show that one, taken as it is said to be.
 )
 @options.target
 @options.image_size
-@options.folds
+@options.folds_anew
 @options.jobs
 @options.cluster
 @options.as_json
 def evaluate(
-    calibration: Path,
+    calibration: str,
     others: tuple[str, ...],
     target: str | None,
     image_size: tuple[int, int] | None,
-    folds: int,
+    folds: int | None,
     jobs: int | None,
     cluster: str | None,
     as_json: bool,
 ) -> None:
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
-    from orthoscope.cli.executors import processes, threads
+    from orthoscope.cli.executors import threads
     from orthoscope.cli.inputs import detections_from
+    from orthoscope.cli.judged import EVALUATION, judged
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import evaluation_lines, evaluation_numbers, to_json
-    from orthoscope.evaluation.evaluate import evaluate as judge
+    from orthoscope.cli.summary import evaluation_lines, to_json
     from orthoscope.evaluation.evaluate import evaluate_on
-    from orthoscope.formats.own.json import load_calibration
+    from orthoscope.fitting.calibration import Calibration
+    from orthoscope.formats.load import load_source
+    from orthoscope.formats.own.json import text_of
+    from orthoscope.geometry.arrays import InputError
 
-    loaded = load_calibration(calibration)
-    if not others:
-        with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
-            evaluation = judge(loaded, folds=folds, executor=executor, progress=progress)
+    path = Path(calibration)
+    if not others and (path.is_dir() or path.name == EVALUATION):
+        loaded = None
+    else:
+        loaded = load_source(calibration, image_size=image_size)
+        if not isinstance(loaded, Calibration) and not (others and target):
+            raise InputError(
+                f"{calibration} is a camera without the photographs that it was made from; expected photographs"
+                " and their target: --on PHOTOS --target chessboard:9x6:25mm."
+            )
+    if not others or loaded is None:
+        evaluation = judged(path, folds=folds, jobs=jobs, cluster=cluster)
         click.echo(
-            to_json(evaluation_numbers(evaluation)) if as_json else "\n".join(evaluation_lines(evaluation))
+            text_of(evaluation) if as_json else "\n".join(evaluation_lines(evaluation)) + "\n", nl=False
         )
         return
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
-        board = target or loaded.detections.target
+        board = target or loaded.detections.target  # type: ignore[union-attr]  # a calibration, as checked above
         detections, _ = detections_from(
             others, board, image_size=image_size, executor=executor, progress=progress
         )
-    shape = None if target else loaded.target_shape  # another board has another shape
+    shape = (
+        loaded.target_shape if isinstance(loaded, Calibration) and not target else None
+    )  # another board has another shape
     test = evaluate_on(loaded.camera, detections, shape=shape)
     if as_json:
         rejected = [{"name": entry.image, "reason": entry.reason} for entry in test.detections.set_aside]

@@ -1,53 +1,123 @@
-"""`orthoscope export`: a camera to the file of the tool that is used next."""
+"""`orthoscope export` and `orthoscope convert`: a camera to the file of the tool that is used next."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from orthoscope.cli import options
 
-__all__ = ["export"]
+__all__ = ["convert", "export"]
 
-EXAMPLE = """\b
+EXPORT_EXAMPLE = """\b
 Example:
   $ orthoscope export camera/calibration.json --to opencv -o camera.yaml
-  lens       brown instead of the free lens: 0.024 px apart on average where corners were seen, 0.16 px at most
+  lens       brown, since opencv cannot hold this free lens: 0.024 px apart on average where corners were seen, 0.16 px at most
   wrote      camera.yaml
 
 \b
-A formula is written exactly or not at all. opencv, ros and kalibr have no free lens: the nearest formula that they have is written, and
-the line above says what it costs. `orthoscope calibrate --export TOOL` chooses that formula by held-out error.
+`orthoscope tools` lists what TOOL may be. A camera is written exactly, or as the nearest that the tool can hold, and
+the line above says what that costs. `orthoscope calibrate --export TOOL` chooses a formula of the tool by held-out error.
+"""
+CONVERT_EXAMPLE = """\b
+Examples:
+  $ orthoscope convert camera_info.yaml cameras.txt --to colmap
+  wrote      cameras.txt
+  $ orthoscope convert camchain.yaml#cam1 half.json --to orthoscope --resize 640x480
+
+\b
+IN is a camera of any tool that `orthoscope tools` lists, known by its content; of several cameras in a file, #NAME names one.
+"""
+TOOLS_EXAMPLE = """\b
+Example:
+  $ orthoscope tools
+  opencv     OpenCV (cv2.FileStorage): brown, rational, kannala_brandt; .yaml .yml .xml .json
 """
 
 
-@click.command(epilog=EXAMPLE)
-@options.calibration_file
-@click.option("--to", "tool", required=True, metavar="TOOL", help="opencv, ros or kalibr.")
+class _WithTools(click.Command):
+    """A verb whose help ends with the tools of the table, which is loaded for that only."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_epilog(ctx, formatter)
+        formatter.write("\nTools:\n" + "".join(f"  {line}\n" for line in tool_lines()))
+
+
+@click.command(cls=_WithTools, epilog=EXPORT_EXAMPLE)
+@click.argument("calibration", metavar="CAMERA")
+@click.option(
+    "--to", "tool", required=True, type=options.TOOL, help="The tool that is to read it; see below."
+)
 @click.option(
     "-o",
     "--out",
     type=click.Path(path_type=Path, dir_okay=False),
-    default=Path("camera.yaml"),
-    show_default=True,
-    help="File to write.",
+    help="File to write; by default camera with the tool's suffix. The suffix says which of its files is meant.",
 )
-def export(calibration: Path, tool: str, out: Path) -> None:
+@options.another_size
+@options.tool_settings
+def export(calibration: str, tool: str, out: Path | None, **settings: Any) -> None:
     """Write a camera for another tool."""
-    from orthoscope.fitting.calibration import Calibration
-    from orthoscope.formats.export import export as write
-    from orthoscope.formats.export import exportable
-    from orthoscope.formats.own.json import load, load_camera
-    from orthoscope.models.lenses import lens_name
+    from orthoscope.formats.table import FORMATS
 
-    thing = load(calibration)
-    camera = load_camera(calibration)
-    known = exportable(camera, tool, made_from=thing if isinstance(thing, Calibration) else None)
-    write(known.camera, out, tool)
-    if known.camera is not camera:
-        click.echo(
-            f"lens       {lens_name(known.camera.lens)} instead of the free lens: {known.apart_px:.2g} px"
-            f" apart on average {known.where}, {known.farthest_px:.2g} px at most"
-        )
-    click.echo(f"wrote      {out}")
+    write_for(calibration, out or Path(f"camera{FORMATS[tool].suffixes[0]}"), tool, **settings)
+
+
+@click.command(cls=_WithTools, epilog=CONVERT_EXAMPLE)
+@click.argument("source", metavar="IN")
+@click.argument("out", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT")
+@click.option(
+    "--to", "tool", required=True, type=options.TOOL, help="The tool that is to read it; see below."
+)
+@click.option("--image-size", type=options.SIZE, help="Size of the photographs, where IN does not say it.")
+@options.another_size
+@options.tool_settings
+def convert(source: str, out: Path, tool: str, **settings: Any) -> None:
+    """Turn one tool's camera into another's."""
+    write_for(source, out, tool, **settings)
+
+
+@click.command(epilog=TOOLS_EXAMPLE)
+def tools() -> None:
+    """List the tools whose cameras are read and written."""
+    click.echo("\n".join(tool_lines()))
+
+
+def tool_lines() -> list[str]:
+    """A line for each tool: name, title, lenses, suffixes."""
+    from orthoscope.formats.table import FORMATS
+
+    width = max(map(len, FORMATS))
+    return [
+        f"{name:<{width}}  {record.title}: {', '.join(record.lens_names)}; {' '.join(record.suffixes)}"
+        for name, record in FORMATS.items()
+    ]
+
+
+def write_for(
+    source: str,
+    out: Path,
+    tool: str,
+    *,
+    name: str,
+    anyway: bool,
+    image_size: tuple[int, int] | None = None,
+    crop: Any = None,
+    binning: int | None = None,
+    resize: tuple[int, int] | None = None,
+) -> None:
+    """Write the camera of a file for a tool, and say what that costs."""
+    from orthoscope.files.whole_files import check_not_onto
+    from orthoscope.formats.export import export as write
+    from orthoscope.formats.load import load_source
+
+    loaded = load_source(source, image_size=image_size)
+    check_not_onto([out], [source.rpartition("#")[0] if not Path(source).exists() else source])
+    if crop or binning or resize:
+        loaded = options.camera_at_another_size(getattr(loaded, "camera", loaded), crop, binning, resize)
+    exported = write(loaded, out, tool, name=name, anyway=anyway)
+    for remark in exported.remarks():
+        click.echo(f"lens       {remark}")
+    click.echo(f"wrote      {', '.join(map(str, exported.files))}")

@@ -12,7 +12,9 @@ from pathlib import Path
 from orthoscope.formats.corners_vnl import read_vnl
 from orthoscope.formats.own.json import load_detections
 from orthoscope.geometry.arrays import InputError
-from orthoscope.targets.detections import Detections, Target, parse_target
+from orthoscope.targets.detections import Detections
+from orthoscope.targets.table import parse_target
+from orthoscope.targets.target import Target
 
 __all__ = ["detections_from"]
 

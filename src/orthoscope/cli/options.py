@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 __all__ = [
+    "another_size",
     "as_json",
     "calibration_file",
+    "camera_at_another_size",
+    "camera_file",
     "cluster",
     "folds",
+    "folds_anew",
     "image_size",
     "jobs",
     "keep",
@@ -23,6 +29,7 @@ __all__ = [
     "shape",
     "skew",
     "target",
+    "tool_settings",
 ]
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -45,6 +52,89 @@ class _Size(click.ParamType):
         return width, height
 
 
+class _Tool(click.ParamType):
+    """A tool of the table; the table is loaded only where a name is to be checked or completed."""
+
+    name = "TOOL"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        from orthoscope.formats.table import tool
+
+        return tool(value).name
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        from orthoscope.formats.table import FORMATS
+
+        return [
+            CompletionItem(name, help=record.title)
+            for name, record in FORMATS.items()
+            if name.startswith(incomplete)
+        ]
+
+
+class _Crop(click.ParamType):
+    name = "WxH+X+Y"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        found = re.fullmatch(r"(\d{1,7})x(\d{1,7})\+(\d{1,7})\+(\d{1,7})", str(value))
+        if isinstance(value, tuple) or not found:
+            return (
+                value
+                if isinstance(value, tuple)
+                else self.fail(
+                    f"{value!r} is no part of an image; expected WIDTHxHEIGHT+LEFT+TOP, such as 640x480+320+240.",
+                    param,
+                    ctx,
+                )
+            )
+        width, height, left, top = (int(part) for part in found.groups())
+        return left, top, (width, height)
+
+
+TOOL = _Tool()
+
+
+def another_size(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """--crop, --binning and --resize: the same camera for photographs of another size, done in this order."""
+    resize = click.option(
+        "--resize", type=_Size(), help="The same camera for photographs scaled to this size."
+    )
+    binning = click.option(
+        "--binning",
+        type=click.IntRange(1),
+        help="The same camera where blocks of N x N pixels are read as one.",
+    )
+    crop = click.option(
+        "--crop",
+        type=_Crop(),
+        help="The same camera for a part of its photographs: its size, its first pixel.",
+    )
+    return crop(binning(resize(verb)))
+
+
+def camera_at_another_size(
+    camera: Any, crop: Any, binning: int | None, resize: tuple[int, int] | None
+) -> Any:
+    """The camera cropped, binned and resized as `another_size` was told."""
+    camera = camera.cropped(*crop) if crop else camera
+    camera = camera.binned(binning) if binning else camera
+    return camera.resized(resize) if resize else camera
+
+
+def tool_settings(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """--name and --anyway, as `export` takes them."""
+    name = click.option(
+        "--name", default="camera", show_default=True, help="Of the camera, where the tool names cameras."
+    )
+    anyway = click.option(
+        "--anyway", is_flag=True, help="Write even where the tool cannot come within a pixel of the camera."
+    )
+    return name(anyway(verb))
+
+
+SIZE = _Size()
 photos: Decorator = click.argument("photos", nargs=-1, required=True, metavar="PHOTOS...")
 target: Decorator = click.option(
     "--target",
@@ -104,6 +194,11 @@ folds: Decorator = click.option(
     type=click.IntRange(2),
     help="Parts that the views are held out in.",
 )
+folds_anew: Decorator = click.option(
+    "--folds",
+    type=click.IntRange(2),
+    help="Judge anew, holding the views out in so many parts, though an evaluation.json is at hand.",
+)
 jobs: Decorator = click.option(
     "--jobs",
     type=click.IntRange(1),
@@ -127,6 +222,7 @@ keep: Decorator = click.option(
     show_default=True,
     help="all: every photographed pixel, with black borders; valid: only places that were photographed.",
 )
+camera_file: Decorator = click.argument("camera", metavar="CAMERA")
 as_json: Decorator = click.option(
     "--json", "as_json", is_flag=True, help="Print one JSON object instead of text."
 )

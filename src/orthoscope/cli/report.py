@@ -14,6 +14,10 @@ EXAMPLE = """\b
 Example:
   $ orthoscope report camera/calibration.json --photos photos/ -o report.html
   wrote      report.html
+
+\b
+CALIBRATION.json is what `calibrate` wrote, or its folder; the evaluation.json beside it is read, and made anew only
+where it is missing, of another calibration, or --folds is asked for.
 """
 
 
@@ -22,7 +26,7 @@ Example:
 @click.option(
     "--photos", multiple=True, metavar="PHOTOS", help="The photographs, to show one before and after."
 )
-@options.folds
+@options.folds_anew
 @options.keep
 @options.jobs
 @options.cluster
@@ -37,26 +41,21 @@ Example:
 def report(
     calibration: Path,
     photos: tuple[str, ...],
-    folds: int,
+    folds: int | None,
     keep: str,
     jobs: int | None,
     cluster: str | None,
     out: Path,
 ) -> None:
     """Write the report page of a calibration: one HTML file that needs nothing else."""
-    from orthoscope.cli.executors import processes
-    from orthoscope.cli.progress import bar
-    from orthoscope.evaluation.evaluate import evaluate
+    from orthoscope.cli.judged import judged
     from orthoscope.files.images import photographs
     from orthoscope.files.whole_files import check_folder
-    from orthoscope.formats.own.json import load_calibration
     from orthoscope.report.page import write_report
     from orthoscope.straight.undistort import before_and_after
 
-    loaded = load_calibration(calibration)
     check_folder(out.parent)
+    evaluation = judged(calibration, folds=folds, jobs=jobs, cluster=cluster)
     files = {path.name: path for path in photographs(photos)} if photos else {}
-    with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
-        evaluation = evaluate(loaded, folds=folds, executor=executor, progress=progress)
-    write_report(evaluation, out, photograph=before_and_after(loaded, files, keep=keep))
+    write_report(evaluation, out, photograph=before_and_after(evaluation.calibration, files, keep=keep))
     click.echo(f"wrote      {out}")

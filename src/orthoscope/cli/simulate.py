@@ -23,8 +23,8 @@ Examples:
 @click.option(
     "--camera",
     "source",
-    type=click.Path(path_type=Path),
-    help="A camera.json, calibration.json or truth.json; by default the camera of `orthoscope demo`.",
+    metavar="CAMERA",
+    help="A camera of ours or of any tool (`orthoscope tools`); by default that of `orthoscope demo`.",
 )
 @click.option(
     "--lens",
@@ -84,7 +84,7 @@ Examples:
     help="Folder to write.",
 )
 def simulate(
-    source: Path | None,
+    source: str | None,
     lens: str | None,
     image_size: tuple[int, int] | None,
     focal: float | None,
@@ -105,7 +105,7 @@ def simulate(
     from orthoscope.files.whole_files import check_folder
     from orthoscope.formats.own.json import save
     from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-    from orthoscope.targets.detections import parse_target
+    from orthoscope.targets.table import parse_target
 
     check_folder(out)
     rng = np.random.default_rng(seed)
@@ -130,9 +130,9 @@ def simulate(
         click.echo(f"wrote      {views} photographs into {folder}/")
 
 
-def _camera(source: Path | None, lens: str | None, image_size: tuple[int, int] | None, focal: float | None):
+def _camera(source: str | None, lens: str | None, image_size: tuple[int, int] | None, focal: float | None):
     """The camera that was asked for: of a file, of a lens, or that of the demo."""
-    from orthoscope.formats.own.json import load_camera
+    from orthoscope.formats.load import load_camera
     from orthoscope.geometry.arrays import InputError
     from orthoscope.models.camera import Camera, Intrinsics
     from orthoscope.models.lenses import lens_with_values

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -15,13 +14,14 @@ if TYPE_CHECKING:
     from orthoscope.models.camera import Camera
     from orthoscope.targets.detections import Outlier
 
-__all__ = ["camera_numbers", "evaluation_lines", "evaluation_numbers", "to_json"]
+__all__ = ["camera_numbers", "evaluation_lines", "to_json"]
 
 SHOWN = 6  # photographs set aside that are listed one by one
 
 
 def evaluation_lines(evaluation: Evaluation) -> list[str]:
     """The summary: views, errors, camera with standard deviations, warnings, verdict."""
+    from orthoscope.geometry.numbers import with_error
     from orthoscope.models.lenses import lens_name
 
     calibration = evaluation.calibration
@@ -39,8 +39,8 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
     )
     if not math.isnan(evaluation.held_out_rms_px):
         lines.append(
-            f"held out   {evaluation.held_out_rms_px:.3f} ± {evaluation.held_out_error_px:.3f} px per point,"
-            " on views that were not used"
+            f"held out   {with_error(evaluation.held_out_rms_px, evaluation.held_out_error_px)} px per point, on"
+            " views that were not used"
         )
     lines.append(f"NCE        {evaluation.nce:.3f} (1 is what rounding to whole pixels would give)")
     lines.append(f"misfit     {_misfit_line(evaluation.misfit.target.test, evaluation.misfit.lens.test)}")
@@ -90,51 +90,6 @@ def _choice_lines(calibration: Calibration) -> list[str]:
             f" lens {other.lens} {how} held out"
         )
     return lines
-
-
-def evaluation_numbers(evaluation: Evaluation) -> dict[str, Any]:
-    """The same as one object for machines; what is not known is None."""
-    calibration = evaluation.calibration
-    detections = calibration.detections
-    return {
-        "rms_px": evaluation.rms_px,
-        "median_px": evaluation.median_px,
-        "largest_px": evaluation.largest_px,
-        "held_out_rms_px": evaluation.held_out_rms_px,
-        "held_out_error_px": evaluation.held_out_error_px,
-        "nce": evaluation.nce,
-        "misfit": {
-            "target": asdict(evaluation.misfit.target.test),
-            "lens": asdict(evaluation.misfit.lens.test),
-        },
-        "coverage": evaluation.coverage,
-        "corners": detections.corners,
-        "views_used": len(detections.views),
-        "views_rejected": [{"name": entry.image, "reason": entry.reason} for entry in detections.set_aside],
-        "corners_left_out": [outlier._asdict() for outlier in detections.outliers],
-        "views_suspect": [{"name": image, "reason": reason} for image, reason in evaluation.suspects],
-        "views": [
-            {
-                "name": view.image,
-                "corners": view.corners,
-                "rms_px": view.rms_px,
-                "held_out_rms_px": view.held_out_rms_px,
-            }
-            for view in evaluation.views
-        ],
-        "camera": camera_numbers(calibration.camera),
-        "deviations": calibration.uncertainty.deviations,
-        "method": calibration.method,
-        "target_shape": {
-            "kind": calibration.target_shape.kind,
-            "rms_mm": 1e3 * calibration.target_shape.rms,
-            "height_mm": 1e3 * calibration.target_shape.height,
-        },
-        "candidates": [one._asdict() for one in calibration.candidates],
-        "status": calibration.status,
-        "warnings": list(evaluation.warnings),
-        "verdict": evaluation.verdict,
-    }
 
 
 def camera_numbers(camera: Camera) -> dict[str, Any]:
@@ -191,9 +146,7 @@ def _plain(thing: Any) -> Any:
 
 
 def _number(name: str, value: float, deviations: dict[str, float]) -> str:
-    """`fx 533.04 ± 0.61`: as many digits as the standard deviation makes meaningful."""
-    deviation = deviations.get(name)
-    if deviation is None or not math.isfinite(deviation) or deviation <= 0:
-        return f"{name} {value:.6g}"
-    places = max(0, 1 - math.floor(math.log10(deviation)))
-    return f"{name} {value:.{places}f} ± {deviation:.{places}f}"
+    """`fx 533.04 ± 0.61`."""
+    from orthoscope.geometry.numbers import six_digits, with_error
+
+    return f"{name} {with_error(value, deviations.get(name, math.nan), alone=six_digits)}"

@@ -24,7 +24,7 @@ PHOTOS are files, folders and globs of photographs; and video files (mp4, m4v, m
 
 
 @click.command(epilog=EXAMPLE)
-@options.calibration_file
+@options.camera_file
 @options.photos
 @click.option(
     "-o",
@@ -39,7 +39,7 @@ PHOTOS are files, folders and globs of photographs; and video files (mp4, m4v, m
 @options.cluster
 @options.as_json
 def undistort(
-    calibration: Path,
+    camera: str,
     photos: tuple[str, ...],
     out: Path,
     keep: str,
@@ -51,20 +51,21 @@ def undistort(
     from orthoscope.cli.summary import camera_numbers, to_json
     from orthoscope.files.images import photographs
     from orthoscope.files.whole_files import check_folder
-    from orthoscope.formats.own.json import load_camera, save
+    from orthoscope.formats.load import load_camera
+    from orthoscope.formats.own.json import save
     from orthoscope.straight.film import is_video
     from orthoscope.straight.undistort import straight_camera
 
-    camera = load_camera(calibration)
+    loaded = load_camera(camera)
     films = list(dict.fromkeys(Path(path) for path in photos if is_video(path)))
     pictures = [path for path in photos if not is_video(path)]
     paths = photographs(pictures) if pictures or not films else []
     check_folder(out)
-    frames = straighten_films(films, camera, out, keep=keep, jobs=jobs)
+    frames = straighten_films(films, loaded, out, keep=keep, jobs=jobs)
     written, failed = (
-        straighten(paths, camera, out, keep=keep, jobs=jobs, cluster=cluster) if paths else ([], [])
+        straighten(paths, loaded, out, keep=keep, jobs=jobs, cluster=cluster) if paths else ([], [])
     )
-    straight = straight_camera(camera, keep=keep)
+    straight = straight_camera(loaded, keep=keep)
     save(straight, out / "camera.json")
     if as_json:
         rejected = [{"name": name, "reason": reason} for name, reason in failed]

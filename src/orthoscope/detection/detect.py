@@ -12,39 +12,25 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from orthoscope.detection.chessboard import board_size, find_chessboard
+from orthoscope.detection.chessboard import board_size, see_chessboard
+from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.files.images import names_of, photographs, read_image
 from orthoscope.geometry.arrays import CalibrationError, InputError, ndarray
-from orthoscope.targets.detections import Detections, SetAside, Target, View, parse_target
+from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.table import parse_target
+from orthoscope.targets.target import Target
 
 __all__ = ["DETECTORS", "detect"]
 
-Detector = Callable[[ndarray, Target], tuple[ndarray, ndarray] | None]
+Detector = Callable[[ndarray, Target], Sight | Unseen]
 LISTED = 5  # photographs whose reasons are told where none showed the target
-GUESSES = 3  # photographs that are then searched for boards of other sizes
-USUAL_BOARDS = (
-    (9, 6),
-    (8, 6),
-    (7, 6),
-    (8, 5),
-    (7, 5),
-    (6, 5),
-    (7, 7),
-    (6, 4),
-    (5, 4),
-    (10, 7),
-    (11, 8),
-    (12, 9),
-    (13, 9),
-    (14, 9),
-    (4, 3),
-)
+LOOKED_AT = 3  # photographs that are then looked at for a board of another size
 
 
 class _Look(NamedTuple):
@@ -54,7 +40,7 @@ class _Look(NamedTuple):
 
     size: tuple[int, int] | None
     digest: str
-    found: tuple[ndarray, ndarray] | None
+    found: Sight | None
     reason: str
 
 
@@ -91,23 +77,22 @@ def detect(
     return Detections(target, size, tuple(views), tuple(aside))
 
 
-def _detect_chessboard(grey: ndarray, target: Target) -> tuple[ndarray, ndarray] | None:
-    assert target.grid is not None
-    corners = find_chessboard(grey, *target.grid)
-    return None if corners is None else (np.arange(len(corners)), corners)
+def _chessboard(grey: ndarray, target: Target) -> Sight | Unseen:
+    if not isinstance(target.board, Chessboard):
+        raise InputError(f"target {target.name!r} has no board; expected a chessboard.")
+    return see_chessboard(grey, target.board)
 
 
-DETECTORS: dict[str, Detector] = {"chessboard": _detect_chessboard}
+DETECTORS: dict[str, Detector] = {Chessboard.kind: _chessboard}
 
 
 def _detector_for(target: Target) -> Detector:
-    kind = target.name.partition(":")[0]
-    if kind not in DETECTORS:
+    if target.kind not in DETECTORS:
         raise InputError(
             f"target {target.name!r} cannot be looked for in photographs; expected one of"
             f" {', '.join(DETECTORS)}. Hand in corners instead."
         )
-    return DETECTORS[kind]
+    return DETECTORS[target.kind]
 
 
 def _look(file: Path, target: Target, detector: Detector) -> _Look:
@@ -121,8 +106,8 @@ def _look(file: Path, target: Target, detector: Detector) -> _Look:
     return _Look(
         size,
         hashlib.sha256(grey.tobytes()).hexdigest(),
-        found,
-        "" if found else f"{target.name} was not found in it",
+        found if isinstance(found, Sight) else None,
+        "" if isinstance(found, Sight) else f"{target.name} {found.reason}",
     )
 
 
@@ -173,27 +158,20 @@ def _nothing_found(
     if not readable:
         return f"none of {len(files)} photographs can be read; expected images. Look at them:{reasons}"
     told = f"{target.name} was found in none of {len(readable)} photographs; expected it in most of them."
-    if board := _board_instead(readable, target):
+    if isinstance(target.board, Chessboard) and (board := _board_instead(readable, target.board)):
         columns, rows = board
         return (
             f"{told} There seems to be a board of {columns}x{rows} inner corners in"
             f" {readable[0].name if len(readable) == 1 else 'them'}: if that is the one, say --target"
-            f" chessboard:{columns}x{rows}:{target.name.rpartition(':')[2]}."
+            f" {replace(target.board, columns=columns, rows=rows).description}."
         )
-    return (
-        f"{told} Count its inner corners (one fewer than squares, each way), and see that it is whole, sharp"
-        f" and lit:{reasons}"
-    )
+    advice = target.board.advice if target.board else "See that it is whole, sharp and lit"
+    return f"{told} {advice}:{reasons}"
 
 
-def _board_instead(files: list[Path], target: Target) -> tuple[int, int] | None:
+def _board_instead(files: list[Path], target: Chessboard) -> tuple[int, int] | None:
     """The size of the board that most of a few photographs show, where it is not the target's."""
-    columns, rows = target.grid or (0, 0)
-    near = [
-        (columns + i, rows + j) for i, j in ((-1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1), (-2, -2))
-    ]
-    guesses = [board for board in dict.fromkeys([*near, *USUAL_BOARDS]) if min(board) >= 3]
-    few = files[:: max(1, len(files) // GUESSES)][:GUESSES]
-    seen = Counter(board for file in few if (board := board_size(read_image(file, grey=True), guesses)))
-    others = {board: count for board, count in seen.items() if sorted(board) != sorted((columns, rows))}
+    few = files[:: max(1, len(files) // LOOKED_AT)][:LOOKED_AT]
+    seen = Counter(board for file in few if (board := board_size(read_image(file, grey=True))))
+    others = {board: count for board, count in seen.items() if sorted(board) != sorted(target.grid)}
     return max(others, key=lambda board: others[board], default=None)

@@ -1,10 +1,11 @@
-"""A grid of corners as it lies in the picture: its local directions, how its lines bend, and where it stops
-being a grid.
+"""Corners of a lattice as they lie in the picture: its local directions, how its lines bend, and where it
+stops being a lattice.
 
-At each corner a cubic is laid through the nearest four of its row, and of its column: its slope is one square
-in pixels, its second derivative how a straight edge bends there (a lens does that). A parabola fitted to the
-nearest five says whether a corner is on its neighbours' line: one that lies far from it has been mistaken for
-something else.
+Corners come with their places, column and row in steps of the lattice, so that it does not matter which of
+them were found. At each a cubic is laid through the nearest four of its row, and of its column: its slope is
+one step in pixels, its second derivative how a straight edge bends there (a lens does that). A parabola
+fitted to the nearest five says whether a corner is on its neighbours' line: one that lies far from it has
+been mistaken for something else.
 """
 
 from __future__ import annotations
@@ -16,18 +17,20 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["GridShape", "cross", "grid_shape", "nearest_neighbour", "one_line_more"]
+__all__ = ["GridShape", "cross", "grid_shape", "lattice", "nearest_neighbour", "one_line_more"]
 
 EXACT = (4, 3)  # corners of a line and degree: through these the polynomial goes
 SMOOTH = (5, 2)  # and between these
 
 
 class GridShape(NamedTuple):
-    """At each of m corners, row by row.
+    """At each of m corners.
 
-    along, down: (m,2) one square along the row and along the column, pixels. bend_along, bend_down: (m,)
-    curvature of those lines, 1/px, positive towards +90 degrees (from x to y) of their direction. stray: (m,)
-    distance from its neighbours' lines, in squares.
+    Args:
+        along, down: (m,2) one step along the row and along the column, pixels.
+        bend_along, bend_down: (m,) curvature of those lines, 1/px, positive towards +90 degrees (from x to y)
+            of their direction.
+        stray: (m,) distance from its neighbours' lines, in steps.
     """
 
     along: Float[ndarray, "m 2"]
@@ -37,30 +40,36 @@ class GridShape(NamedTuple):
     stray: Float[ndarray, " m"]
 
 
-def grid_shape(corners: Float[ndarray, "m 2"], columns: int, rows: int) -> GridShape:
-    """The shape of a grid of corners, pixels, row by row."""
-    grid = corners.reshape(rows, columns, 2)
-    _, along, turn_along = np.einsum("kij,rjc->kric", _polynomials(columns, *EXACT), grid).reshape(3, -1, 2)
-    _, down, turn_down = np.einsum("kij,jsc->kisc", _polynomials(rows, *EXACT), grid).reshape(3, -1, 2)
-    on_row = np.einsum("ij,rjc->ric", _polynomials(columns, *SMOOTH)[0], grid).reshape(-1, 2)
-    on_column = np.einsum("ij,jsc->isc", _polynomials(rows, *SMOOTH)[0], grid).reshape(-1, 2)
-    square = np.maximum(np.minimum(np.hypot(*along.T), np.hypot(*down.T)), 1e-9)
-    stray = np.maximum(np.hypot(*(corners - on_row).T), np.hypot(*(corners - on_column).T)) / square
+@cache
+def lattice(columns: int, rows: int) -> Float[ndarray, "m 2"]:
+    """The places of a full grid, row by row."""
+    row, column = np.mgrid[:rows, :columns].reshape(2, -1).astype(float)
+    places = np.stack([column, row], axis=1)
+    places.setflags(write=False)
+    return places
+
+
+def grid_shape(corners: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> GridShape:
+    """The shape of a lattice around corners, pixels, that are at these places of it."""
+    along, turn_along, on_row = _along_lines(corners, places, 0)
+    down, turn_down, on_column = _along_lines(corners, places, 1)
+    step = np.maximum(np.minimum(np.hypot(*along.T), np.hypot(*down.T)), 1e-9)
+    stray = np.maximum(np.hypot(*(corners - on_row).T), np.hypot(*(corners - on_column).T)) / step
     return GridShape(along, down, _curvature(along, turn_along), _curvature(down, turn_down), stray)
 
 
-def nearest_neighbour(corners: Float[ndarray, "m 2"], columns: int, rows: int) -> Float[ndarray, " m"]:
-    """The distance from each corner to the nearest of the corners next to it in its row and column,
-    pixels.
-    """
-    grid = corners.reshape(rows, columns, 2)
-    nearest = np.full((rows, columns), np.inf)
+def nearest_neighbour(corners: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Float[ndarray, " m"]:
+    """The shortest step from each corner towards those next to it in its row and column, pixels."""
+    nearest = np.full(len(corners), np.inf)
     for axis in (0, 1):
-        gaps = np.sqrt((np.diff(grid, axis=axis) ** 2).sum(-1))
-        ends = np.full_like(np.take(gaps, [0], axis=axis), np.inf)
-        nearest = np.minimum(nearest, np.concatenate([gaps, ends], axis=axis))
-        nearest = np.minimum(nearest, np.concatenate([ends, gaps], axis=axis))
-    return nearest.ravel()
+        for line in _lines(places, axis):
+            gaps = np.hypot(*np.diff(corners[line], axis=0).T) / np.diff(places[line, axis])
+            np.minimum.at(nearest, line[:-1], gaps)
+            np.minimum.at(nearest, line[1:], gaps)
+    alone = ~np.isfinite(nearest)
+    if alone.any():
+        nearest[alone] = nearest[~alone].min() if (~alone).any() else 1.0
+    return nearest
 
 
 def one_line_more(grid: Float[ndarray, "rows columns 2"]) -> Float[ndarray, "more columns 2"]:
@@ -79,16 +88,53 @@ def _curvature(slope: ndarray, turn: ndarray) -> ndarray:
     return cross(slope, turn) / np.maximum((slope * slope).sum(-1), 1e-9) ** 1.5
 
 
+def _along_lines(
+    corners: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], axis: int
+) -> tuple[Float[ndarray, "m 2"], Float[ndarray, "m 2"], Float[ndarray, "m 2"]]:
+    """First and second derivative along the lattice's lines, and the place on the smooth line, of each
+    corner.
+
+    A corner that is alone on its line has the slope of the corner nearest to it that is not.
+    """
+    slope, turn, smooth = np.full_like(corners, np.nan), np.zeros_like(corners), corners.copy()
+    groups: dict[tuple[float, ...], list[ndarray]] = {}
+    for line in _lines(places, axis):
+        groups.setdefault(tuple(places[line, axis]), []).append(line)
+    for steps, lines in groups.items():
+        which = np.stack(lines)
+        if len(steps) > 1:
+            _, slope[which], turn[which] = np.einsum(
+                "kij,ljc->klic", _polynomials(steps, *EXACT), corners[which]
+            )
+            smooth[which] = np.einsum("ij,ljc->lic", _polynomials(steps, *SMOOTH)[0], corners[which])
+    alone = np.isnan(slope[:, 0])
+    if alone.all():
+        return np.zeros_like(slope), turn, smooth
+    if alone.any():
+        apart = np.abs(places[alone, None] - places[~alone]).sum(-1)
+        slope[alone] = slope[~alone][apart.argmin(1)]
+    return slope, turn, smooth
+
+
+def _lines(places: Float[ndarray, "m 2"], axis: int) -> list[ndarray]:
+    """Indices of the corners of each row (axis 0) or column (axis 1), in order."""
+    order = np.lexsort((places[:, axis], places[:, 1 - axis]))
+    ends = np.flatnonzero(np.diff(places[order, 1 - axis])) + 1
+    return np.split(order, ends)
+
+
 @cache
-def _polynomials(count: int, nearest: int, degree: int) -> Float[ndarray, "3 count count"]:
-    """Matrices from `count` points of a line to value, first and second derivative, at each, of a polynomial
+def _polynomials(places: tuple[float, ...], nearest: int, degree: int) -> Float[ndarray, "3 count count"]:
+    """Matrices from the points of a line to value, first and second derivative, at each, of a polynomial
     fitted to the nearest.
     """
+    count, at = len(places), np.array(places)
     width = min(nearest, count)
     matrices = np.zeros((3, count, count))
     for i in range(count):
         first = min(max(i - (width - 1) // 2, 0), count - width)
         nearby = np.arange(first, first + width)
-        powers = np.vander(nearby - i, min(degree, width - 1) + 1, increasing=True)
-        matrices[:, i, nearby] = np.linalg.pinv(powers)[:3] * np.array([[1.0], [1.0], [2.0]])
+        powers = np.vander(at[nearby] - at[i], min(degree, width - 1) + 1, increasing=True)
+        inverse = np.linalg.pinv(powers)[:3]
+        matrices[: len(inverse), i, nearby] = inverse * np.array([[1.0], [1.0], [2.0]])[: len(inverse)]
     return matrices

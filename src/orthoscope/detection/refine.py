@@ -11,35 +11,55 @@ the picture is no saddle, cornerSubPix has the last word. docs/detection.md has 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 
 from orthoscope.detection.grid import grid_shape, nearest_neighbour
 from orthoscope.detection.saddle import fit_saddles
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, ndarray
 
-__all__ = ["refined"]
+__all__ = ["Refined", "refined"]
 
 NEAR_SHARE = 0.25  # of a square: half the window of cornerSubPix
 SHARE = 0.45  # of a square: half the window of the fit
 USUAL = 50.0  # px a square: larger ones are reduced to about this
 REACH = 18.0  # px: half the largest window
 SMOOTHING = 0.5  # px, sigma: what a camera sharpened until it jumps from pixel to pixel has slopes again
+NOISE_LEFT = 0.41  # of its variance, after smoothing
+SADDLE_SQUARE = 0.6  # mean square of a blurred saddle over its window, about
 FARTHEST = 0.35  # of a square: a fit that ends farther from its start is not believed,
-LEAST_EXPLAINED = 0.85  # nor one that explains less of its window's variance
+LEAST_EXPLAINED = 0.85  # nor one that explains less of what is not noise of its window's variance
 
 
-def refined(grey: ndarray, rough: Float[ndarray, "m 2"], columns: int, rows: int) -> Float[ndarray, "m 2"]:
-    """Corners (columns * rows, 2), row by row, pixels, from ones that are right to a fifth of a square.
-
-    grey: (h,w) uint8.
+class Refined(NamedTuple):
+    """pixels: (m,2) of the corners.  believed: (m,) whether a saddle was fitted; else cornerSubPix had the
+    last word.
     """
-    square = nearest_neighbour(rough, columns, rows)
+
+    pixels: Float[ndarray, "m 2"]
+    believed: Bool[ndarray, " m"]
+
+
+def refined(
+    grey: ndarray, rough: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], *, approach: bool = True
+) -> Refined:
+    """Corners from ones that are right to a fifth of a step of their lattice.
+
+    Args:
+        grey: (h,w) uint8.
+        rough: (m,2) pixels.
+        places: (m,2) column and row of each in the lattice, in steps.
+        approach: whether cornerSubPix comes near first; not where it went astray before.
+    """
+    square = nearest_neighbour(rough, places)
     shrink = max(1, round(float(np.median(square)) / USUAL))
     first, part = _surroundings(grey, rough, square.max())
     small = _reduced(part, shrink)
-    near = _near(small, (rough - first + 0.5) / shrink - 0.5, columns, rows)
-    shape = grid_shape(near, columns, rows)
+    near = (rough - first + 0.5) / shrink - 0.5
+    near = _near(small, near, places) if approach else near
+    shape = grid_shape(near, places)
     saddles = fit_saddles(
         cv2.GaussianBlur(small, (0, 0), SMOOTHING),
         near,
@@ -47,9 +67,12 @@ def refined(grey: ndarray, rough: Float[ndarray, "m 2"], columns: int, rows: int
         _window(shape.down),
         bends=np.stack([shape.bend_along, shape.bend_down], axis=1),
     )
-    allowed = np.maximum(FARTHEST * nearest_neighbour(near, columns, rows), 1.0)
-    believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > LEAST_EXPLAINED)
-    return (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
+    allowed = np.maximum(FARTHEST * nearest_neighbour(near, places), 1.0)
+    signal = SADDLE_SQUARE * saddles.contrast**2
+    least = LEAST_EXPLAINED * signal / np.maximum(signal + _noise(small) * NOISE_LEFT, 1e-9)
+    believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
+    pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
+    return Refined(pixels, believed)
 
 
 def _surroundings(
@@ -71,9 +94,15 @@ def _reduced(grey: ndarray, shrink: int) -> ndarray:
     )
 
 
-def _near(grey: ndarray, corners: ndarray, columns: int, rows: int) -> ndarray:
+def _noise(grey: ndarray) -> float:
+    """The variance of a picture's noise, from what differs from pixel to pixel in its even parts."""
+    rough = cv2.filter2D(grey, cv2.CV_32F, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32))
+    return float((np.median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)
+
+
+def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
     """cornerSubPix with a window that suits each corner's own squares."""
-    radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, columns, rows)), 2, REACH).astype(int)
+    radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, places)), 2, REACH).astype(int)
     places = np.clip(corners, 0, np.array(grey.shape[::-1]) - 1).astype(np.float32)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-2)
     for size in np.unique(radius):

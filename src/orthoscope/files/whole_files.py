@@ -7,11 +7,27 @@ happens before that (a full disk, Ctrl-C) leaves the place as it was. Folders ar
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from orthoscope.geometry.arrays import InputError
 
-__all__ = ["check_folder", "read_bytes", "read_text", "write_bytes", "write_text"]
+# Bytes of a file's name; no usual file system takes more.
+LONGEST_NAME = 255
+
+__all__ = [
+    "check_folder",
+    "check_not_onto",
+    "keep_inputs",
+    "read_bytes",
+    "read_text",
+    "write_bytes",
+    "write_text",
+]
+
+# Files that are being read: device and number of each. `write_bytes` replaces none of them.
+_INPUTS: set[tuple[int, int]] = set()
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -23,9 +39,9 @@ def read_bytes(path: str | Path) -> bytes:
         return Path(path).read_bytes()
     except FileNotFoundError as error:
         raise InputError(f"{path} does not exist; expected a file. Check the name and the folder.") from error
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise InputError(
-            f"{path} cannot be read ({_reason(error)}); expected a file that you may read."
+            f"{_shown(path)} cannot be read ({_reason(error)}); expected a file that you may read."
         ) from error
 
 
@@ -53,8 +69,10 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
     Raises InputError where the place cannot be written.
     """
-    place = Path(os.path.realpath(path))
     try:
+        place = Path(os.path.realpath(path))
+        if _identity(place) in _INPUTS and place.read_bytes() != content:
+            raise InputError(_onto(path))
         if place.is_dir():
             raise InputError(f"{path} is a folder; expected the name of a file to write.")
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -62,9 +80,11 @@ def write_bytes(path: str | Path, content: bytes) -> None:
             place.write_bytes(content)
         else:
             _replace(place, content)
-    except OSError as error:
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(
-            f"{path} cannot be written ({_reason(error)}); choose another place or free this one."
+            f"{_shown(path)} cannot be written ({_reason(error)}); choose another place or free this one."
         ) from error
 
 
@@ -75,12 +95,66 @@ def check_folder(folder: str | Path) -> None:
     written.
     """
     place = Path(folder).absolute()
-    while not place.exists():
-        place = place.parent
+    try:
+        while not place.exists():
+            place = place.parent
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{_shown(folder)} cannot be written ({_reason(error)}); choose another place."
+        ) from error
+    longest = max(map(len, (os.fsencode(part) for part in Path(folder).parts)), default=0)
+    if longest > LONGEST_NAME:
+        raise InputError(
+            f"{_shown(folder)} cannot be written (a name of {longest} bytes); expected at most"
+            f" {LONGEST_NAME}."
+        )
     if not place.is_dir():
         raise InputError(f"{place} is a file; expected a folder to write into. Choose another place.")
     if not os.access(place, os.W_OK | os.X_OK):
         raise InputError(f"{place} may not be written; choose another place or change its permissions.")
+
+
+@contextmanager
+def keep_inputs(paths: Iterable[str | Path]) -> Iterator[None]:
+    """Within this block `write_bytes` replaces none of these files, by whatever name, unless by the same
+    bytes.
+
+    The command line says this of all that it is given to read; a program that saves what it has loaded is
+    free to.
+    """
+    before = set(_INPUTS)
+    _INPUTS.update(identity for path in paths if (identity := _identity(Path(path))))
+    try:
+        yield
+    finally:
+        _INPUTS.clear()
+        _INPUTS.update(before)
+
+
+def check_not_onto(places: Iterable[str | Path], inputs: Iterable[str | Path]) -> None:
+    """Says before a job that one of its outputs is one of its inputs, by whatever name.
+
+    Raises InputError, naming it.
+    """
+    known = {identity for path in inputs if (identity := _identity(Path(path)))}
+    for place in places:
+        if _identity(Path(place)) in known:
+            raise InputError(_onto(place))
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Device and number of a file that exists."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    return (found.st_dev, found.st_ino) if path.is_file() else None
+
+
+def _onto(path: str | Path) -> str:
+    return (
+        f"{path} is one of the files that are read; what is read is never written onto. Choose another place."
+    )
 
 
 def _replace(place: Path, content: bytes) -> None:
@@ -93,7 +167,15 @@ def _replace(place: Path, content: bytes) -> None:
         raise
 
 
-def _reason(error: OSError) -> str:
+def _shown(path: str | Path) -> str:
+    """A path for a message, cut where it is very long."""
+    text = str(path).replace("\0", "\\0")
+    return text if len(text) <= LONGEST_NAME else text[:60] + "..."
+
+
+def _reason(error: Exception) -> str:
+    if not isinstance(error, OSError):
+        return str(error)
     at = (
         f": {error.filename}"
         if isinstance(error, NotADirectoryError | FileExistsError) and error.filename

@@ -17,7 +17,8 @@ from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.models.parameters import Parameters
 from orthoscope.models.target_shape import TargetShape
-from orthoscope.targets.detections import Detections, Target
+from orthoscope.targets.detections import Detections
+from orthoscope.targets.target import Target
 
 __all__ = ["Calibration", "Candidate", "Uncertainty", "points_of", "residuals_of", "rms"]
 

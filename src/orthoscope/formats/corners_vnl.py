@@ -24,7 +24,8 @@ import numpy as np
 
 from orthoscope.files.whole_files import read_text, write_text
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.targets.detections import Detections, SetAside, Target, View
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.target import Target
 
 __all__ = ["read_vnl", "write_vnl"]
 

@@ -1,197 +1,212 @@
-"""A camera as the file of another tool, a formula exactly or not at all: `EXPORTERS` says which tools.
+"""A camera to the file of another tool: exactly where the tool can hold it, else the nearest that it can
+hold.
 
-The tools named here put pixel (0, 0) where we do, so no number changes; none of them has a skew or a lens
-frame. All three files are YAML, of a kind so plain that it is written as text.
-
-opencv   what cv2.FileStorage reads: camera_matrix and distortion_coefficients of cv2.calibrateCamera (5, 8,
-12, 14) or cv2.fisheye (4).
-ros      camera_info as camera_calibration_parsers reads it: plumb_bob (5), rational_polynomial (8),
-equidistant (4).
-kalibr   camchain: pinhole with radtan (k1 k2 p1 p2), equidistant (4) or fov (w).
+Nearest is by least squares in pixels over the rays of the corners that the camera was made from (over the
+frame where only the camera is known), K and the coefficients free, the orientation fixed, so that poses stay
+what they are. What that costs is said, and above LIMIT_PX nothing is written unless one insists.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.files.whole_files import write_text
+from orthoscope.files.whole_files import write_bytes
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.methods.decoupled.step_two import nearest_formula
-from orthoscope.models.camera import Camera
+from orthoscope.fitting.lens_fit import FOCAL, about_principal_point, fit_pairs
+from orthoscope.formats.record import Contents, Format, Holding, share_beyond, shifted
+from orthoscope.formats.table import tool as record_of
+from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
+from orthoscope.geometry.pose import Pose
+from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.difference import frame_grid
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Brown, Fov, KannalaBrandt, Rational, lens_name
-from orthoscope.models.opencv_order import opencv_coefficients
+from orthoscope.models.lenses import lens_name, parse_lens
+from orthoscope.simulation.scene import Scene
 
-__all__ = ["EXPORTERS", "Exportable", "export", "exportable"]
+__all__ = ["LIMIT_PX", "Exportable", "Exported", "export", "exportable"]
 
-
-class _Model(NamedTuple):
-    """A tool's name for a lens, and the coefficients in the tool's order."""
-
-    name: str
-    coefficients: list[float]
-
-
-def export(camera: Camera, path: str | Path, format_name: str) -> None:
-    """Writes a camera for another tool, one of EXPORTERS.
-
-    Raises InputError for a tool that is not there, a lens, skew or lens frame that it does not have, and
-    where the file cannot be written.
-    """
-    if format_name not in EXPORTERS:
-        raise InputError(
-            f"no file for {format_name!r} can be written; expected one of {', '.join(EXPORTERS)}."
-        )
-    if camera.intrinsics.skew != 0.0:
-        raise InputError(
-            f"{format_name} has no skew, and this camera's is {camera.intrinsics.skew:g} px. Calibrate"
-            " without skew."
-        )
-    if camera.lens_frame is not None:
-        raise InputError(
-            f"{format_name} has no distortion centre of its own, and this camera has. Fit a lens about the"
-            " principal point."
-        )
-    write_text(path, EXPORTERS[format_name].text(camera))
+# A formula that is farther than this from the camera, on average, is another camera.
+LIMIT_PX = 1.0
 
 
 class Exportable(NamedTuple):
-    """A camera that a tool can hold, and how far its images are from those of the camera that was asked for:
-    on average, at most, where.
+    """A camera that a tool can hold, and how far its images are from those of the camera that was asked for.
+
+    Args:
+        camera: as the tool holds it, in our pixels.
+        apart_px: distance on average.
+        farthest_px: distance at most.
+        where: of which pixels that is said, in words.
+        lacks: what of the camera the tool cannot hold; empty where it is held exactly.
+        beyond: share of the frame's pixels with rays so far from the axis that the tool has no image for
+            them.
     """
 
     camera: Camera
     apart_px: float
     farthest_px: float
     where: str
+    lacks: str = ""
+    beyond: float = 0.0
 
 
-def exportable(camera: Camera, format_name: str, *, made_from: Calibration | None = None) -> Exportable:
-    """The camera itself, or, where its lens is a free one, the nearest formula that the tool has.
+class Exported(NamedTuple):
+    """What was written.
 
-    made_from: the calibration of the camera; the nearest is then judged where its corners were seen,
-    otherwise over the frame. Raises InputError for a tool that is not there, CalibrationError where none of
-    its formulas sees so far from the axis.
+    Args:
+        tool: the record of the tool.
+        held: the camera that stands in the file, and what it costs.
+        files: that were written.
     """
-    if format_name not in EXPORTERS:
+
+    tool: Format
+    held: Exportable
+    files: tuple[Path, ...]
+
+    def remarks(self) -> tuple[str, ...]:
+        """What one must know of the file, a sentence each; none where it is the camera itself."""
+        held, told = self.held, []
+        if held.lacks:
+            told.append(
+                f"{lens_name(held.camera.lens)}, since {self.tool.name} cannot hold {held.lacks}:"
+                f" {held.apart_px:.2g} px apart on average {held.where}, {held.farthest_px:.2g} px at most"
+            )
+        if held.beyond > 0:
+            holding = self.tool.holding(held.camera.lens)
+            assert holding is not None, "the camera is one that the tool holds"
+            told.append(
+                f"{100 * held.beyond:.2g} % of the frame looks farther than {holding.farthest_deg:g} degrees"
+                f" from the axis, where {self.tool.name} has no image or a wrong one"
+            )
+        return tuple(told)
+
+
+def export(
+    source: Calibration | Camera | Scene | Contents,
+    path: str | Path,
+    tool: str,
+    *,
+    name: str = "camera",
+    anyway: bool = False,
+) -> Exported:
+    """Writes a camera for another tool, and what it costs where the tool cannot hold it exactly.
+
+    Args:
+        source: a calibration is better than its camera: its corners say where the camera is known, its poses
+            go along where the tool takes them.
+        path: of the file; where the tool has several kinds, its suffix says which.
+        tool: a name in FORMATS, such as `opencv`.
+        name: of the camera, where the tool names cameras.
+        anyway: write also what is farther from the camera than LIMIT_PX.
+    Raises:
+        InputError: the tool is not known, cannot come near enough, or the place cannot be written.
+        CalibrationError: no lens of the tool sees as far from the axis.
+    """
+    record = record_of(tool)
+    camera = source if isinstance(source, Camera) else source.camera
+    made_from = source if isinstance(source, Calibration) else None
+    held = exportable(camera, tool, made_from=made_from)
+    if held.apart_px > LIMIT_PX and not anyway:
         raise InputError(
-            f"no file for {format_name!r} can be written; expected one of {', '.join(EXPORTERS)}."
+            f"{tool} cannot hold {held.lacks}: the nearest that it can is {held.apart_px:.2g} px away on"
+            f" average"
+            f" {held.where} ({held.farthest_px:.2g} px at most); expected at most {LIMIT_PX:g} px. Choose"
+            f" another"
+            " tool, calibrate with a lens that it has, or insist (--anyway)."
         )
-    if not isinstance(camera.lens, FreeLens):
-        return Exportable(camera, 0.0, 0.0, "over the frame")
-    pixels = (
-        frame_grid(camera.image_size)
-        if made_from is None
-        else np.concatenate([view.pixels for view in made_from.detections.views])
+    contents = Contents(
+        shifted(held.camera, record.pixel_origin),
+        poses=_poses(source),
+        name=_checked_name(name),
+        trusted=None if made_from is None else _corners(made_from) + record.pixel_origin,
     )
-    rays = camera.unproject(pixels)
-    rays = rays[np.isfinite(rays).all(1)]
-    other = nearest_formula(camera, rays, EXPORTERS[format_name].lenses)
-    apart = np.hypot(*(other.project(rays) - camera.project(rays)).T)
-    where = "over the frame" if made_from is None else "where corners were seen"
-    return Exportable(other, float(apart.mean()), float(apart.max()), where)
+    files = record.write(contents, Path(path))
+    for place, content in files.items():
+        write_bytes(place, content.encode() if isinstance(content, str) else content)
+    return Exported(record, held, tuple(files))
 
 
-def _opencv(camera: Camera) -> str:
-    lens = camera.lens
-    if isinstance(lens, Brown | Rational):
-        model = _Model("opencv", opencv_coefficients(lens))
-    elif isinstance(lens, KannalaBrandt):
-        model = _Model("opencv_fisheye", lens.coefficients.tolist())
-    else:
-        raise _no_such_lens(lens, "opencv", "brown, rational and kannala_brandt")
-    width, height = camera.image_size
-    return (
-        f"%YAML:1.0\n---\nimage_width: {width}\nimage_height: {height}\n"
-        "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data:"
-        f" {_numbers(camera.intrinsics.matrix)}\n"
-        f'distortion_model: "{model.name}"\n'
-        f"distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: {len(model.coefficients)}\n  "
-        " dt: d\n"
-        f"   data: {_numbers(model.coefficients)}\n"
-    )
+def exportable(camera: Camera, tool: str, *, made_from: Calibration | None = None) -> Exportable:
+    """The camera itself where a tool can hold it, else the nearest that it can hold.
 
-
-def _ros(camera: Camera) -> str:
-    lens = camera.lens
-    if isinstance(lens, KannalaBrandt):
-        model = _Model("equidistant", lens.coefficients.tolist())
-    elif isinstance(lens, Brown | Rational) and len(coefficients := opencv_coefficients(lens)) <= 8:
-        model = _Model("plumb_bob" if len(coefficients) == 5 else "rational_polynomial", coefficients)
-    else:
-        raise _no_such_lens(lens, "ros", "brown and rational without prism and tilt, and kannala_brandt")
-    width, height = camera.image_size
-    matrix = camera.intrinsics.matrix
-
-    def block(name: str, values: ndarray) -> str:
-        return f"{name}:\n  rows: {values.shape[0]}\n  cols: {values.shape[1]}\n  data: {_numbers(values)}\n"
-
-    return (
-        f"image_width: {width}\nimage_height: {height}\ncamera_name: camera\n"
-        + block("camera_matrix", matrix)
-        + f"distortion_model: {model.name}\n"
-        + block("distortion_coefficients", np.array([model.coefficients]))
-        + block("rectification_matrix", np.eye(3))
-        + block("projection_matrix", np.hstack([matrix, np.zeros((3, 1))]))
-    )
-
-
-def _kalibr(camera: Camera) -> str:
-    lens = camera.lens
-    if isinstance(lens, KannalaBrandt):
-        model = _Model("equidistant", lens.coefficients.tolist())
-    elif isinstance(lens, Fov):
-        model = _Model("fov", [lens.w])
-    elif isinstance(lens, Brown) and not any(opencv_coefficients(lens)[4:]):
-        model = _Model("radtan", opencv_coefficients(lens)[:4])
-    else:
-        raise _no_such_lens(
-            lens,
-            "kalibr",
-            "brown with k1, k2, p1 and p2 only (--lens brown:k1,k2,p1,p2), kannala_brandt and fov",
-        )
-    return (
-        "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n  distortion_coeffs:"
-        f" {_numbers(model.coefficients)}\n  distortion_model: {model.name}\n  intrinsics:"
-        f" {_numbers(camera.intrinsics.as_tuple()[:4])}\n  resolution: [{camera.image_size[0]},"
-        f" {camera.image_size[1]}]\n  rostopic: /cam0/image_raw\n"
-    )
-
-
-class Exporter(NamedTuple):
-    """How a tool's file is written, and the lenses that it can hold as they are freed by a calibration for
-    it.
+    Args:
+        tool: a name in FORMATS.
+        made_from: the calibration of the camera; the nearest is then judged where its corners were seen,
+            otherwise over the frame.
+    Raises:
+        InputError: the tool is not known.
+        CalibrationError: none of the tool's lenses sees so far from the axis.
     """
-
-    text: Callable[[Camera], str]
-    lenses: tuple[str, ...]
-
-
-EXPORTERS: dict[str, Exporter] = {
-    "opencv": Exporter(_opencv, ("brown", "rational", "kannala_brandt")),
-    "ros": Exporter(_ros, ("brown", "rational", "kannala_brandt")),
-    "kalibr": Exporter(_kalibr, ("brown:k1,k2,p1,p2", "kannala_brandt", "fov")),
-}
-
-
-def _numbers(values: ndarray | Iterable[float]) -> str:
-    """YAML list; each number with a point and the digits that read back as the same."""
-    return "[" + ", ".join(_number(value) for value in np.ravel(list(values)).tolist()) + "]"
-
-
-def _number(value: float) -> str:
-    text = repr(value)  # 1e-05 is a string to YAML 1.1; 1.0e-05 is a number
-    return text.replace("e", ".0e") if "e" in text and "." not in text else text
+    record = record_of(tool)
+    lacks = record.lacks(camera)
+    where = "over the frame" if made_from is None else "where corners were seen"
+    if not lacks:
+        holding = record.holding(camera.lens)
+        assert holding is not None, "nothing is lacking"
+        beyond = share_beyond(camera, holding.farthest_deg)
+        return Exportable(camera, 0.0, 0.0, where, "", beyond)
+    rays = camera.unproject(frame_grid(camera.image_size) if made_from is None else _corners(made_from))
+    rays = rays[np.isfinite(rays).all(1)]
+    other, holding = _nearest(camera, rays, record)
+    apart = np.hypot(*(other.project(rays) - camera.project(rays)).T)
+    beyond = share_beyond(other, holding.farthest_deg)
+    return Exportable(other, float(apart.mean()), float(apart.max()), where, lacks, beyond)
 
 
-def _no_such_lens(lens: Lens, tool: str, can: str) -> InputError:
-    return InputError(
-        f"{tool} cannot hold this {lens_name(lens)} lens exactly; it has {can}. Calibrate with one of these."
-    )
+def _nearest(camera: Camera, rays: Float[ndarray, "n 3"], record: Format) -> tuple[Camera, Holding]:
+    """The camera of the tool whose image of the rays is nearest to this camera's, in pixels."""
+    wanted = camera.project(rays)
+    frame = camera.lens_frame or camera.intrinsics
+    skew = frame.skew if record.skew else 0.0
+    focal = FOCAL if record.two_focals else ("fx=fy", "cx", "cy")
+    if record.skew:
+        focal = (*focal, "skew")
+    fy = frame.fy if record.two_focals else frame.fx
+    plain = replace(camera, intrinsics=Intrinsics(frame.fx, fy, frame.cx, frame.cy, skew), lens_frame=None)
+    near: list[tuple[float, Camera, Holding]] = []
+    for text in record.lenses:
+        kind, free = parse_lens(text)
+        starts = [replace(plain, lens=kind(**start)) for start in kind.starts]
+        try:
+            other = fit_pairs(about_principal_point(rays, wanted, (*focal, *free)), starts).unknowns
+        except CalibrationError:
+            continue
+        other = other.with_unit_scale()
+        holding = record.holding(other.lens)
+        if holding and np.isfinite(apart := ((other.project(rays) - wanted) ** 2).sum()):
+            near.append((float(apart), other, holding))
+    if not near:
+        raise CalibrationError(
+            f"none of {', '.join(record.lenses)} sees as far from the axis as this camera does. Use a tool"
+            f" with a"
+            " lens of the angle."
+        )
+    _, other, holding = min(near, key=lambda entry: entry[0])
+    return other, holding
+
+
+def _corners(calibration: Calibration) -> Float[ndarray, "n 2"]:
+    """The pixels of all corners that the camera was made from."""
+    return np.concatenate([view.pixels for view in calibration.detections.views])
+
+
+def _poses(source: Calibration | Camera | Scene | Contents) -> Mapping[str, Pose]:
+    """camera_from_target by the photograph's name, where they are known."""
+    if isinstance(source, Calibration):
+        images = [view.image for view in source.detections.views]
+        return dict(zip(images, source.camera_from_target, strict=True))
+    if isinstance(source, Scene):
+        return dict(zip(source.images, source.camera_from_target, strict=True))
+    return source.poses if isinstance(source, Contents) else {}
+
+
+def _checked_name(name: str) -> str:
+    if not name or not all(letter.isalnum() or letter in "_-/." for letter in name):
+        raise InputError(
+            f"camera name {name!r} cannot stand in a tool's file; expected letters, digits, _, -, / and dots."
+        )
+    return name

@@ -1,99 +1,187 @@
-"""OpenCV's calibration files (YAML, XML or JSON of cv2.FileStorage), read as a camera.
+"""OpenCV's calibration files: YAML, XML or JSON of cv2.FileStorage.
 
 OpenCV's own sample, its interactive tool and our export name the same things differently; all of these are
-known.
+read. Coefficients stand in OpenCV's order, 4, 5, 8, 12 or 14 of cv2.calibrateCamera or 4 of cv2.fisheye, as
+few as hold them all. `fisheye_model` is what OpenCV's sample looks for, `distortion_model` what our older
+files have. The files are read without cv2.FileStorage, which ends the process on some damaged ones.
 """
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
 
-import cv2
 import numpy as np
 
-from orthoscope.files.whole_files import read_text
-from orthoscope.geometry.arrays import InputError, ndarray
+from orthoscope.formats.record import Contents, Files, Format, Holding
+from orthoscope.formats.syntax import Document, matrix, number, whole_number, yaml_list
+from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
 from orthoscope.models.opencv_order import OPENCV_ORDER
 
-__all__ = ["read_opencv"]
+__all__ = ["OPENCV"]
 
-MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "intrinsic_matrix", "K", "M1")
-COEFFICIENTS = ("distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients", "D", "D1")
+# Names by which a camera's matrix and coefficients go in OpenCV's samples, tools and tutorials.
+MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "intrinsic_matrix", "mtx", "K", "M1")
+COEFFICIENTS = (
+    "distortion_coefficients",
+    "dist_coeffs",
+    "distCoeffs",
+    "Distortion_Coefficients",
+    "dist_coeff",
+    "dist",
+    "D",
+    "D1",
+)
 WIDTH, HEIGHT = ("image_width", "image_Width"), ("image_height", "image_Height")
 FISHEYE = ("opencv_fisheye", "fisheye", "equidistant")
 
 
-def read_opencv(path: str | Path, *, image_size: tuple[int, int] | None = None) -> Camera:
-    """The camera in a file of cv2.FileStorage: 4, 5, 8, 12 or 14 coefficients, or the 4 of cv2.fisheye where
-    the file says so.
+def _recognises(document: Document) -> bool:
+    if document.xml is not None:
+        return document.xml.tag == "opencv_storage"
+    if document.json is not None:
+        return b'"opencv-matrix"' in document.content
+    text = document.text or ""
+    return text.startswith("%YAML:1.0") or "!!opencv-matrix" in text
 
-    image_size: (width, height), for a file that does not hold it.
-    Raises InputError where the file is none of OpenCV's or something is missing.
-    """
-    storage = _opened(read_text(path), path)
-    matrix, coefficients = _matrix(storage, MATRIX), _matrix(storage, COEFFICIENTS)
-    if matrix is None or matrix.shape != (3, 3):
-        raise InputError(
-            f"{path} has no 3x3 matrix named {' or '.join(MATRIX[:2])}; expected a file of OpenCV's"
-            " calibration."
+
+def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str, Contents]:
+    table = _table_of(document.xml) if document.xml is not None else document.table
+    if not isinstance(table, dict) or not table:
+        raise document.refuse("cannot be read; expected YAML, XML or JSON as cv2.FileStorage writes it")
+    intrinsics = _first_matrix(table, MATRIX, document)
+    if intrinsics is None or intrinsics.shape != (3, 3):
+        raise document.refuse(
+            f"has no 3x3 matrix named {' or '.join(MATRIX[:2])}; expected a file of OpenCV's calibration"
         )
-    if abs(matrix[0, 1]) > 0:
-        raise InputError(
-            f"{path} has a skew of {matrix[0, 1]:g} px, which OpenCV itself leaves out; set it to 0 to read"
-            " what OpenCV sees."
+    if abs(intrinsics[0, 1]) > 0:
+        raise document.refuse(
+            f"has a skew of {intrinsics[0, 1]:g} px, which OpenCV itself leaves out",
+            "Set it to 0 to read what OpenCV sees.",
         )
-    size = image_size or (_whole(storage, WIDTH), _whole(storage, HEIGHT))
-    if not all(size):
-        raise InputError(
-            f"{path} does not say how large its images are (image_width, image_height); hand in image_size."
-        )
-    lens = _lens(
-        np.zeros(0) if coefficients is None else coefficients.ravel(), fisheye=_is_fisheye(storage), path=path
-    )
-    return Camera(size, Intrinsics(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]), lens)
+    coefficients = _first_matrix(table, COEFFICIENTS, document)
+    if coefficients is None and "distortion_model" in table:
+        raise document.refuse("names a distortion and has no coefficients of it; expected both")
+    values = [] if coefficients is None else coefficients.ravel().tolist()
+    lens = OPENCV.lens("cv2.fisheye" if _is_fisheye(table, document) else "cv2", values, document)
+    size = image_size or _size(table, document)
+    fx, fy, cx, cy = intrinsics[0, 0], intrinsics[1, 1], intrinsics[0, 2], intrinsics[1, 2]
+    return {"camera": Contents(Camera(size, Intrinsics(fx, fy, cx, cy), lens))}
 
 
-def _opened(text: str, path: str | Path) -> cv2.FileStorage:
-    try:
-        return cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-    except (cv2.error, SystemError) as error:  # OpenCV 5 wraps the first in the second
-        raise InputError(
-            f"{path} cannot be read by OpenCV; expected YAML, XML or JSON of cv2.FileStorage."
-        ) from error
+def _write(contents: Contents, place: Path) -> Files:
+    camera = contents.camera
+    holding = OPENCV.holding(camera.lens)
+    assert holding is not None, "export hands in what the tool holds"
+    fields: dict[str, Any] = {
+        "image_width": camera.image_size[0],
+        "image_height": camera.image_size[1],
+        "fisheye_model": int(holding.word == "cv2.fisheye"),
+        "distortion_model": "opencv_fisheye" if holding.word == "cv2.fisheye" else "opencv",
+        "camera_matrix": camera.intrinsics.matrix,
+        "distortion_coefficients": np.array([holding.values(camera.lens)]),
+    }
+    return {place: WRITERS.get(place.suffix.lower(), _as_yaml)(fields)}
 
 
-def _lens(coefficients: ndarray, *, fisheye: bool, path: str | Path) -> Lens:
-    """The lens with these coefficients; more than 5 are a rational lens unless k4, k5 and k6 are zero."""
-    count = len(coefficients)
-    if fisheye and count == 4:
-        return KannalaBrandt(*coefficients.tolist())
-    if fisheye or count not in (0, 4, 5, 8, 12, 14):
-        raise InputError(
-            f"{path} has {count} distortion coefficients; expected 4, 5, 8, 12 or 14, or 4 of a fisheye."
-        )
-    values = dict(zip(OPENCV_ORDER, coefficients.tolist(), strict=False))
-    rational = any(values.get(name) for name in ("k4", "k5", "k6")) or count == 8
-    kind = Rational if rational else Brown
-    return kind().with_coefficients(**{name: value for name, value in values.items() if name in kind.names()})
+def _as_yaml(fields: dict[str, Any]) -> str:
+    def line(name: str, value: Any) -> str:
+        if isinstance(value, ndarray):
+            rows, columns = value.shape
+            return (
+                f"{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data:"
+                f" {yaml_list(value)}\n"
+            )
+        return f'{name}: "{value}"\n' if isinstance(value, str) else f"{name}: {value}\n"
+
+    return "%YAML:1.0\n---\n" + "".join(line(name, value) for name, value in fields.items())
 
 
-def _is_fisheye(storage: cv2.FileStorage) -> bool:
-    flag, model = storage.getNode("fisheye_model"), storage.getNode("distortion_model")
-    return (not flag.empty() and flag.real() != 0) or (not model.empty() and model.string() in FISHEYE)
+def _as_xml(fields: dict[str, Any]) -> str:
+    def element(name: str, value: Any) -> str:
+        if isinstance(value, ndarray):
+            rows, columns = value.shape
+            data = " ".join(repr(entry) for entry in value.ravel().tolist())
+            return (
+                f'<{name} type_id="opencv-matrix">\n  <rows>{rows}</rows>\n  <cols>{columns}</cols>\n'
+                f"  <dt>d</dt>\n  <data>\n    {data}</data></{name}>\n"
+            )
+        return f"<{name}>{value}</{name}>\n"
+
+    body = "".join(element(name, value) for name, value in fields.items())
+    return f'<?xml version="1.0"?>\n<opencv_storage>\n{body}</opencv_storage>\n'
 
 
-def _matrix(storage: cv2.FileStorage, names: tuple[str, ...]) -> ndarray | None:
+def _as_json(fields: dict[str, Any]) -> str:
+    def plain(value: Any) -> Any:
+        if isinstance(value, ndarray):
+            rows, columns = value.shape
+            data = value.ravel().tolist()
+            return {"type_id": "opencv-matrix", "rows": rows, "cols": columns, "dt": "d", "data": data}
+        return value
+
+    return json.dumps({name: plain(value) for name, value in fields.items()}, indent=4) + "\n"
+
+
+WRITERS = {".xml": _as_xml, ".json": _as_json}
+
+
+def _table_of(root: Element) -> dict[str, Any]:
+    """XML as what YAML and JSON give: elements by name, matrices as objects, the rest as text."""
+    return {
+        element.tag: {part.tag: (part.text or "").strip() for part in element}
+        if len(element)
+        else element.text
+        for element in root
+    }
+
+
+def _first_matrix(table: dict[str, Any], names: tuple[str, ...], document: Document) -> ndarray | None:
     """The first matrix of these names."""
-    for name in names:
-        node = storage.getNode(name)
-        if not node.empty() and (matrix := node.mat()) is not None:
-            return np.asarray(matrix, dtype=float)
-    return None
+    name = next((name for name in names if table.get(name) is not None), None)
+    return None if name is None else matrix(table[name], name, document)
 
 
-def _whole(storage: cv2.FileStorage, names: tuple[str, ...]) -> int:
-    """The first whole number of these names; 0 where there is none."""
-    return next((int(node.real()) for node in map(storage.getNode, names) if not node.empty()), 0)
+def _is_fisheye(table: dict[str, Any], document: Document) -> bool:
+    flag, model = table.get("fisheye_model"), table.get("distortion_model")
+    flagged = flag is not None and number(flag, "fisheye_model", document) != 0
+    return flagged or (isinstance(model, str) and model.strip('" ') in FISHEYE)
+
+
+def _size(table: dict[str, Any], document: Document) -> tuple[int, int]:
+    sides = []
+    for names in (WIDTH, HEIGHT):
+        name = next((name for name in names if name in table), None)
+        if name is None:
+            raise document.refuse(
+                "does not say how large its images are (image_width, image_height)",
+                "Hand in image_size (--image-size 640x480).",
+            )
+        sides.append(whole_number(table[name], name, document))
+    return sides[0], sides[1]
+
+
+OPENCV = Format(
+    name="opencv",
+    title="OpenCV (cv2.FileStorage)",
+    suffixes=(".yaml", ".yml", ".xml", ".json"),
+    holdings=(
+        Holding("brown", "cv2", OPENCV_ORDER[:5]),
+        Holding("rational", "cv2", OPENCV_ORDER[:8]),
+        Holding("kannala_brandt", "cv2.fisheye", ("k1", "k2", "k3", "k4"), farthest_deg=90.0),
+        Holding("brown", "cv2", OPENCV_ORDER[:12]),
+        Holding("rational", "cv2", OPENCV_ORDER[:12]),
+        Holding("brown", "cv2", OPENCV_ORDER),
+        Holding("rational", "cv2", OPENCV_ORDER),
+        Holding("brown", "cv2", OPENCV_ORDER[:4], written=False),
+        Holding("brown", "cv2", (), written=False),
+    ),
+    recognises=_recognises,
+    read=_read,
+    write=_write,
+    remarks="cv2.fisheye takes a ray from behind the camera for one in front of it.",
+)

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
 
-__all__ = ["ABSENT", "degrees", "percent", "pixels", "probability", "setting", "value_with_deviation"]
+__all__ = [
+    "ABSENT",
+    "degrees",
+    "percent",
+    "pixels",
+    "probability",
+    "setting",
+    "six_digits",
+    "value_with_deviation",
+    "with_error",
+]
 
 ABSENT = "\N{EN DASH}"
 
@@ -52,6 +62,26 @@ def value_with_deviation(value: float, deviation: float) -> tuple[str, str]:
         f"{round(value, decimals) + 0.0:.{decimals}f}",
         f"{deviation:.{decimals}f}",
     )  # + 0.0 makes -0 plain 0
+
+
+def with_error(value: float, error: float, *, alone: Callable[[float], str] = pixels) -> str:
+    """A number with its standard error, `0.088 ± 0.015`, the one form of it everywhere.
+
+    Args:
+        value: with the error's unit.
+        error: of one standard deviation; NaN or zero where it is not known.
+        alone: how the value reads without an error.
+    """
+    if not math.isfinite(value):
+        return ABSENT
+    if not math.isfinite(error) or error <= 0:
+        return alone(value)
+    return " ± ".join(value_with_deviation(value, error))
+
+
+def six_digits(value: float) -> str:
+    """A parameter whose error nobody knows."""
+    return f"{value:.6g}" if math.isfinite(value) else ABSENT
 
 
 def setting(value: Any) -> str:

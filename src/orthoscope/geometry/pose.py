@@ -10,9 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
+from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray, normalised
 
-__all__ = ["Pose", "nearest_rotation", "rotation_from_vector", "vector_from_rotation"]
+__all__ = [
+    "Pose",
+    "nearest_rotation",
+    "quaternion_from_rotation",
+    "rotation_from_quaternion",
+    "rotation_from_vector",
+    "vector_from_rotation",
+]
 
 CROSS = np.array(
     [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=float
@@ -79,6 +86,24 @@ def nearest_rotation(matrices: Float[ndarray, "*batch 3 3"]) -> Float[ndarray, "
     left, _, right = np.linalg.svd(matrices)
     left[..., :, 2] *= np.linalg.det(left @ right)[..., None]
     return left @ right
+
+
+def quaternion_from_rotation(rotation: Float[ndarray, "3 3"]) -> Float[ndarray, "4"]:
+    """The unit quaternion (w, x, y, z), w >= 0, of a rotation matrix."""
+    w, axis = _quaternion(rotation)
+    return np.array([w, *axis])
+
+
+def rotation_from_quaternion(quaternion: Float[ndarray, "4"]) -> Float[ndarray, "3 3"]:
+    """The rotation matrix of a quaternion (w, x, y, z) of any length but 0."""
+    w, x, y, z = normalised(quaternion).tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def cross_matrix(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3 3"]:

@@ -8,7 +8,7 @@ centre.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,8 +22,10 @@ from orthoscope.models.parameters import Parameters
 from orthoscope.models.pixel_slopes import PixelSlopes
 from orthoscope.models.smooth_map import smooth_map
 
-__all__ = ["WIDEST", "Camera", "Intrinsics", "image_border"]
+__all__ = ["LARGEST_SIDE", "WIDEST", "Camera", "Intrinsics", "image_border"]
 
+# No image has a side of more pixels; a file that says so is damaged.
+LARGEST_SIDE = 1_000_000
 WIDEST = np.deg2rad(75.0)  # rays farther from the axis than this a pin-hole stretches without end
 
 
@@ -102,8 +104,10 @@ class Camera:
 
     def __post_init__(self) -> None:
         width, height = (int(side) for side in self.image_size)
-        if width < 1 or height < 1:
-            raise InputError(f"image_size is {self.image_size}; expected (width, height) in pixels.")
+        if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
+            raise InputError(
+                f"image_size is {self.image_size}; expected (width, height), 1 to {LARGEST_SIDE} pixels each."
+            )
         object.__setattr__(self, "image_size", (width, height))
 
     def __repr__(self) -> str:
@@ -194,6 +198,73 @@ class Camera:
         fx, fy, cx, cy, skew = self.intrinsics.as_tuple()
         lens = self.lens.with_coefficients(**{name: getattr(self.lens, name) / scale})
         return replace(self, intrinsics=Intrinsics(scale * fx, scale * fy, cx, cy, scale * skew), lens=lens)
+
+    def resized(self, size: tuple[int, int]) -> Camera:
+        """The same camera where its photographs are scaled to another size, a pixel's corner to a pixel's
+        corner.
+
+        Args:
+            size: (width, height) of the new photographs; the same shape or not.
+        Raises:
+            InputError: a side is less than 1.
+        """
+        width, height = self._checked_size(size)
+        across, down = width / self.image_size[0], height / self.image_size[1]
+        return self._with_frame(
+            (width, height),
+            lambda k: Intrinsics(
+                across * k.fx,
+                down * k.fy,
+                across * (k.cx + 0.5) - 0.5,
+                down * (k.cy + 0.5) - 0.5,
+                across * k.skew,
+            ),
+        )
+
+    def cropped(self, left: int, top: int, size: tuple[int, int]) -> Camera:
+        """The same camera where its photographs are cut to a part of them.
+
+        Args:
+            left, top: the part's first pixel, in pixels of this camera.
+            size: (width, height) of the part.
+        Raises:
+            InputError: the part is not within the image.
+        """
+        width, height = self._checked_size(size)
+        if left < 0 or top < 0 or left + width > self.image_size[0] or top + height > self.image_size[1]:
+            raise InputError(
+                f"a part of {width}x{height} from pixel ({left}, {top}) is not within an image of"
+                f" {self.image_size[0]}x{self.image_size[1]}. Choose a part of the image."
+            )
+        return self._with_frame((width, height), lambda k: replace(k, cx=k.cx - left, cy=k.cy - top))
+
+    def binned(self, factor: int) -> Camera:
+        """The same camera where each block of factor x factor pixels is read as one; what is left over is cut
+        off.
+
+        Args:
+            factor: 2 or more; 1 changes nothing.
+        Raises:
+            InputError: the factor is less than 1 or larger than the image.
+        """
+        if factor < 1 or factor > min(self.image_size):
+            raise InputError(
+                f"binning by {factor} is not possible; expected 1 to {min(self.image_size)} pixels a block."
+            )
+        width, height = self.image_size[0] // factor, self.image_size[1] // factor
+        return self.cropped(0, 0, (width * factor, height * factor)).resized((width, height))
+
+    @staticmethod
+    def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+        width, height = (int(side) for side in size)
+        if width < 1 or height < 1:
+            raise InputError(f"the size is {width}x{height}; expected (width, height) of at least 1 pixel.")
+        return width, height
+
+    def _with_frame(self, size: tuple[int, int], moved: Callable[[Intrinsics], Intrinsics]) -> Camera:
+        """The camera of another size, its pixels moved."""
+        frame = self.lens_frame and moved(self.lens_frame)
+        return Camera(size, moved(self.intrinsics), self.lens, frame)
 
     def undistort_pixels(
         self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from orthoscope.geometry.arrays import Int, ndarray
-from orthoscope.targets.detections import Detections, Target, View
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target
 
 __all__ = ["ids_of_subgrid", "on_subgrid", "subgrids"]
 

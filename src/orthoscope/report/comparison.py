@@ -10,8 +10,8 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
-from orthoscope.evaluation.comparison.conclusions import as_good_as_best, conclusions, with_error
-from orthoscope.geometry.numbers import ABSENT, pixels
+from orthoscope.evaluation.comparison.conclusions import as_good_as_best, conclusions
+from orthoscope.geometry.numbers import ABSENT, pixels, with_error
 from orthoscope.version import __version__
 
 if TYPE_CHECKING:

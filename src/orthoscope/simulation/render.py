@@ -1,16 +1,10 @@
-"""Photographs of a chessboard by a known camera: each pixel's ray goes back through the lens onto the board.
+"""Photographs of a target by a known camera: each pixel's ray goes back through the lens onto the sheet.
 
-On the board's plane a place is (X, Y) in squares, corner 0 at (0, 0); the pattern reaches one square beyond
-the corners, the white margin another. A square is black where floor(X) + floor(Y) is even. The ray r of a
-pixel meets the plane at
+On the target's plane a place is (X, Y) in metres. The ray r of a pixel meets the plane at
 
-    (X, Y, 1) mu = M r,    M^-1 = [square R e_x   square R e_y   R p_0 + t],    mu > 0 in front
+    (X, Y, 1) mu = M r,    M^-1 = [R e_x   R e_y   t],    mu > 0 in front
 
-Anti-aliasing is in closed form. Over a footprint of width w the mean of the square wave is (A(X + w/2) - A(X
-- w/2)) / w with A its antiderivative, a triangle wave, and the pattern is a product of one wave in X and one
-in Y. A whole pixel takes one such mean; a pixel that an edge crosses takes oversampling^2 smaller ones,
-placed by the slopes of the map from pixels to the board. Each footprint is symmetric, so edges and corners
-fall where `Camera.project` puts them, whatever the oversampling.
+and what the pixel then shows of the sheet is its mean over the pixel (`sheet.py`).
 
 Then what a camera adds: uneven light, Gaussian blur, cos^4 vignetting, shot and read noise, whole grey
 levels. Grey is linear in light.
@@ -21,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +23,8 @@ from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
 from orthoscope.simulation.scene import Scene, random_views
-from orthoscope.targets.detections import Target, chessboard
+from orthoscope.simulation.sheet import Sheet
+from orthoscope.targets.target import Target, chessboard
 
 __all__ = ["Renderer", "demo_scene", "photographs", "render"]
 
@@ -74,15 +68,15 @@ class Renderer:
         """One photograph, (h,w) uint8; black where a pixel has no ray.
 
         rng: where background, light and noise come from; without it the background is plain, the light even
-        and there is no noise. Raises InputError for a target that is not a full chessboard.
+        and there is no noise. Raises InputError for a target that cannot be drawn.
         """
-        sheet = _sheet(target)
+        sheet = Sheet(target.drawing(), black=BLACK, white=WHITE)
         image = (
             np.full(self._valid.shape, BACKGROUND, dtype=np.float32)
             if rng is None
             else self._surroundings(rng)
         )
-        plane_from_ray = _plane_from_ray(sheet, camera_from_target)
+        plane_from_ray = _plane_from_ray(camera_from_target)
         for start in range(0, len(image), ROWS):
             self._draw(sheet, plane_from_ray, image, start)
         if rng is not None:
@@ -149,7 +143,7 @@ class Renderer:
         sigma = self.noise * np.sqrt(0.5 + 0.5 * np.maximum(image, 0.0) / MID_GREY)
         return sigma * rng.standard_normal(image.shape, dtype=np.float32)
 
-    def _draw(self, sheet: _Sheet, plane_from_ray: ndarray, image: ndarray, start: int) -> None:
+    def _draw(self, sheet: Sheet, plane_from_ray: ndarray, image: ndarray, start: int) -> None:
         """Draw the sheet over ROWS rows of the image."""
         stop, (height, width) = min(start + ROWS, len(image)), image.shape
         first = max(start - 1, 0)  # one row more on either side, for the slopes
@@ -177,7 +171,7 @@ def render(
     noise: float = 2.0,
     light: float = 0.2,
 ) -> ndarray:
-    """One photograph (h,w) uint8 of a chessboard; many of one camera are quicker from one `Renderer`, which
+    """One photograph (h,w) uint8 of a target; many of one camera are quicker from one `Renderer`, which
     explains the settings.
     """
     renderer = Renderer(
@@ -220,65 +214,10 @@ def demo_scene(*, seed: int = 0, count: int = 20) -> Scene:
     return Scene(camera, target, views)
 
 
-class _Sheet(NamedTuple):
-    """A printed chessboard: where corner 0 is (metres, target frame), how large a square, how many corners
-    each way.
-    """
-
-    origin: ndarray
-    square: float
-    corners: tuple[float, float]
-
-    def near(self, x: ndarray, y: ndarray) -> ndarray:
-        """Which places are on the sheet or within half a square of it."""
-        columns, rows = self.corners
-        return (x > -2.5) & (x < columns + 1.5) & (y > -2.5) & (y < rows + 1.5)
-
-    def look(
-        self, place: Float[ndarray, "2 n"], slopes: Float[ndarray, "2 2 n"], oversampling: int
-    ) -> tuple[ndarray, ndarray]:
-        """Share of each pixel that the sheet covers, and the grey that it adds.
-
-        place: (X, Y) at the pixels' centres. slopes: d place / d pixel; [i, j] is of coordinate i along axis
-        j.
-        """
-        cover, grey = self._mean(*place, *np.hypot(slopes[:, 0], slopes[:, 1]))
-        reach = 0.5 * np.abs(slopes).sum(1)  # a pixel's square reaches so far on the board
-        crossed = np.flatnonzero((np.abs(place - np.rint(place)) <= reach).any(0))
-        if oversampling > 1 and len(crossed):
-            offset = (np.arange(oversampling) + 0.5) / oversampling - 0.5
-            offsets = np.stack(np.meshgrid(offset, offset)).reshape(2, -1)
-            sub_place = place[:, crossed, None] + np.einsum("ijn,js->ins", slopes[:, :, crossed], offsets)
-            width = np.hypot(slopes[:, 0, crossed], slopes[:, 1, crossed])[..., None] / oversampling
-            fine_cover, fine_grey = self._mean(*sub_place, *width)
-            cover[crossed], grey[crossed] = fine_cover.mean(-1), fine_grey.mean(-1)
-        return cover, grey
-
-    def _mean(self, x: ndarray, y: ndarray, width_x: ndarray, width_y: ndarray) -> tuple[ndarray, ndarray]:
-        """Cover and grey, in the mean over a footprint of these widths in squares."""
-        columns, rows = self.corners
-        board = _mean_inside(x, width_x, -1.0, columns) * _mean_inside(y, width_y, -1.0, rows)
-        waves = _mean_wave(x, width_x, -1.0, columns) * _mean_wave(y, width_y, -1.0, rows)
-        cover = _mean_inside(x, width_x, -2.0, columns + 1.0) * _mean_inside(y, width_y, -2.0, rows + 1.0)
-        return cover, WHITE * cover - (WHITE - BLACK) * 0.5 * (board + waves)
-
-
-def _sheet(target: Target) -> _Sheet:
-    """The sheet of a full chessboard.  Raises InputError for another target."""
-    if target.grid is None:
-        raise InputError(
-            f"target {target.name!r} is no full chessboard; expected one such as chessboard:9x6:25mm to draw."
-        )
-    columns, rows = target.grid
-    return _Sheet(
-        target.points[0], float(target.points[1, 0] - target.points[0, 0]), (float(columns), float(rows))
-    )
-
-
-def _plane_from_ray(sheet: _Sheet, camera_from_target: Pose) -> Float[ndarray, "3 3"]:
+def _plane_from_ray(camera_from_target: Pose) -> Float[ndarray, "3 3"]:
     """M of the module's docstring, up to a positive factor; zeros for a board seen exactly edge on."""
-    right, down, _ = sheet.square * camera_from_target.rotation.T
-    corner = camera_from_target.apply(sheet.origin[None])[0]
+    right, down, _ = camera_from_target.rotation.T
+    corner = camera_from_target.translation
     adjugate = np.stack([np.cross(down, corner), np.cross(corner, right), np.cross(right, down)])
     return adjugate * np.sign(adjugate[2] @ corner)
 
@@ -299,25 +238,6 @@ def _slopes(plane: Float[ndarray, "2 h w"], index: Int[ndarray, " n"]) -> Float[
         below - above
     )
     return np.nan_to_num(np.stack([along_x, along_y], axis=1), nan=1e-6)
-
-
-def _mean_inside(x: ndarray, width: ndarray, low: float, high: float) -> ndarray:
-    """Mean over [x - width/2, x + width/2] of the function that is 1 in low..high, else 0."""
-    return (np.clip(x + 0.5 * width, low, high) - np.clip(x - 0.5 * width, low, high)) / width
-
-
-def _mean_wave(x: ndarray, width: ndarray, low: float, high: float) -> ndarray:
-    """Mean over [x - width/2, x + width/2] of the square wave in low..high: 1 where floor(x) is even, -1
-    where it is odd, 0 outside.
-    """
-    return (
-        _triangle(np.clip(x + 0.5 * width, low, high)) - _triangle(np.clip(x - 0.5 * width, low, high))
-    ) / width
-
-
-def _triangle(x: ndarray) -> ndarray:
-    """The antiderivative of the square wave: the distance from the nearest even number."""
-    return np.abs(x - 2.0 * np.rint(0.5 * x))
 
 
 def _blurred(image: Float[ndarray, "h w"], sigma: float) -> Float[ndarray, "h w"]:

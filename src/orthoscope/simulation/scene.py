@@ -22,7 +22,8 @@ from orthoscope.geometry.arrays import Bool, CalibrationError, Float, InputError
 from orthoscope.geometry.pose import Pose, cross_matrix, rotation_from_vector
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
-from orthoscope.targets.detections import Detections, SetAside, Target, View, chessboard
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.target import Target, chessboard
 
 __all__ = ["Scene", "paper_scene", "random_views", "simulate_detections"]
 

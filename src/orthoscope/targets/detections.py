@@ -1,11 +1,10 @@
-"""What is photographed and what was found: Target, View, Detections.
+"""What was found in photographs: View, Detections.
 
 A corner's *id* is its row in `Target.points`; a view lists ids, so partial boards are normal.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -13,51 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import InputError, frozen, ndarray
+from orthoscope.targets.target import Target
 
-__all__ = [
-    "Detections",
-    "Outlier",
-    "SetAside",
-    "Target",
-    "View",
-    "chessboard",
-    "parse_length",
-    "parse_target",
-]
-
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
-
-
-@dataclass(frozen=True, eq=False)
-class Target:
-    """A flat calibration target: where its corners nominally are.
-
-    name: how it is asked for, such as `chessboard:9x6:25mm`. points: (m,3) metres, target frame, z = 0.
-    lines: ids of the corners of each row and each column, in order. grid: (columns, rows) of a full
-    chessboard, else None. Raises InputError where a point is not in the plane or a line names a corner that
-    is not there.
-    """
-
-    name: str
-    points: ndarray
-    lines: tuple[ndarray, ...] = ()
-    grid: tuple[int, int] | None = None
-
-    def __post_init__(self) -> None:
-        points = frozen(self.points, (None, 3), f"target {self.name!r}: points")
-        if np.abs(points[:, 2]).max(initial=0.0) > 0.0:
-            raise InputError(
-                f"target {self.name!r} has points off the plane z = 0; orthoscope calibrates with flat"
-                " targets."
-            )
-        object.__setattr__(self, "points", points)
-        lines = tuple(frozen(line, (None,), "line", dtype=np.int64) for line in self.lines)
-        if any(((line < 0) | (line >= len(points))).any() for line in lines):
-            raise InputError(f"target {self.name!r} has a line through a corner that it does not have.")
-        object.__setattr__(self, "lines", lines)
-
-    def __repr__(self) -> str:
-        return f"Target({self.name!r}, {len(self.points)} corners)"
+__all__ = ["Detections", "Outlier", "SetAside", "View"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,53 +119,3 @@ class Detections:
         return replace(
             self, views=views, outliers=tuple(outlier for outlier in self.outliers if outlier.image in images)
         )
-
-
-def chessboard(columns: int, rows: int, square: float) -> Target:
-    """A chessboard of columns x rows inner corners, `square` metres apart; corner 0 first, row by row.
-
-    Raises InputError for fewer than 2 x 2 corners or a square that has no size.
-    """
-    if columns < 2 or rows < 2 or columns * rows < 6 or not square > 0:
-        raise InputError(
-            f"a chessboard of {columns}x{rows} inner corners of {square:g} m cannot be used; "
-            "expected at least 3x2 inner corners and a square larger than 0, such as chessboard:9x6:25mm."
-        )
-    y, x = np.mgrid[:rows, :columns].reshape(2, -1) * square
-    ids = np.arange(rows * columns).reshape(rows, columns)
-    return Target(
-        name=f"chessboard:{columns}x{rows}:{round(square * 1e3, 9):g}mm",
-        points=np.stack([x, y, np.zeros_like(x)], axis=1),
-        lines=(*ids, *ids.T),
-        grid=(columns, rows),
-    )
-
-
-def parse_length(text: str) -> float:
-    """A length with its unit, such as `25mm`, in metres.
-
-    Raises InputError without a number or a unit out of m, cm, mm, um, in.
-    """
-    found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-z]+)\s*", text)
-    try:
-        return float(found[1]) * METRES[found[2]]  # type: ignore[index]
-    except (TypeError, ValueError, KeyError) as error:
-        raise InputError(
-            f"length {text!r} is not understood; expected a number and a unit ({', '.join(METRES)}), such as"
-            " 25mm."
-        ) from error
-
-
-def parse_target(text: str) -> Target:
-    """The target of a description such as `chessboard:9x6:25mm` (inner corners in a row, in a column, length
-    of a square).
-
-    Raises InputError where the description is none.
-    """
-    found = re.fullmatch(r"chessboard:(\d+)x(\d+):(.+)", text.strip())
-    if not found:
-        raise InputError(
-            f"target {text!r} is not understood; expected chessboard:COLUMNSxROWS:SQUARE, "
-            "counting inner corners, such as chessboard:9x6:25mm."
-        )
-    return chessboard(int(found[1]), int(found[2]), parse_length(found[3]))

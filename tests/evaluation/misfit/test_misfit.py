@@ -36,7 +36,8 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
 from orthoscope.models.lenses import KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
-from orthoscope.targets.detections import View, chessboard
+from orthoscope.targets.detections import View
+from orthoscope.targets.target import chessboard
 
 # probability that a right test fails one of these bounds by bad luck; the seeds are fixed, so it is met once
 # and for all

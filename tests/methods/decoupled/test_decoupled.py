@@ -34,7 +34,8 @@ from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import Brown, Division
 from orthoscope.models.target_shape import without_similarity
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, chessboard
+from orthoscope.targets.detections import Detections
+from orthoscope.targets.target import chessboard
 
 BOTH = bowed(1e-3) + stretched(0.01) + drawn((2e-4, 2e-4, 2e-4))
 SHAPES = {
@@ -74,6 +75,7 @@ def test_without_noise_camera_and_target_are_exact(camera: Camera, shape: np.nda
     assert_allclose(found.target_shape.displacements, settled(shape), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_with_noise_camera_and_target_are_found_as_well_as_the_noise_lets_them(
     found: Calibration, noisy: Detections
 ):
@@ -108,6 +110,7 @@ def test_parameters_that_the_data_determined_are_counted(found: Calibration):
     assert all(0.0 < deviation < np.inf for deviation in found.uncertainty.deviations.values())
 
 
+@pytest.mark.slow
 @for_every_camera
 def test_a_perfect_board_and_a_lens_that_its_formula_describes_are_not_harmed(camera: Camera):
     detections = photographed_with(0.0 * BOTH, camera, 10, noise_px=NOISE)
@@ -165,6 +168,7 @@ def test_whatever_is_settled_beforehand_is_kept_and_gives_the_same_again(noisy: 
     assert_same(decoupled(noisy, **first.settings), first)
 
 
+@pytest.mark.slow
 def test_the_same_photographs_give_the_same_choice_to_the_last_bit(noisy: Detections):
     one, other = (decoupled(noisy.only(range(6)), folds=2) for _ in range(2))
     assert_same(one, other)
@@ -183,6 +187,7 @@ def test_a_formula_that_is_asked_for_comes_with_the_free_camera_that_it_was_fitt
     assert decoupled(noisy, lens="brown", target="free", through="formula").free_camera is None
 
 
+@pytest.mark.slow
 def test_out_of_several_formulas_the_one_that_foresees_best_is_taken(noisy: Detections):
     chosen = decoupled(noisy, target="free", through="formula", among=("rational", "division:l", "brown"))
     assert chosen.settings["lens"] == "brown"  # simpler ones do not suffice, richer ones gain nothing

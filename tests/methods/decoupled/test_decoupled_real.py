@@ -66,6 +66,7 @@ def test_on_the_published_test_views_of_babel_cube_it_stays_below_the_best_publi
     assert error(found.target_shape) < error(None)  # measured: 0.228; the test views show the same boards
 
 
+@pytest.mark.slow
 def test_on_calibrel_it_chooses_the_shape_of_the_target_by_itself(calibrel: Calibration):
     assert calibrel.settings["target"] == "free"
     flat, smooth, free = (candidate.held_out_px for candidate in calibrel.candidates[:3])

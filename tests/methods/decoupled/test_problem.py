@@ -23,7 +23,7 @@ from orthoscope.models.target_shape import polynomials
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import NormalEquations, Options, solve
 from orthoscope.solve.losses import Cauchy, Huber, Linear, Loss
-from orthoscope.targets.detections import chessboard
+from orthoscope.targets.target import chessboard
 
 BOARD = chessboard(4, 3, 0.04)
 CORNERS = len(BOARD.points)

@@ -28,7 +28,8 @@ from orthoscope.paper.trials import Condition, simulated
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import solve
 from orthoscope.solve.losses import Linear
-from orthoscope.targets.detections import Detections, Target, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target, chessboard
 
 SIZE = (640, 480)
 BOARD = chessboard(14, 10, 0.02)
@@ -60,6 +61,7 @@ def worst(camera, calibration):
     return np.abs(image_difference(camera, calibration.camera, pixels)).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LENSES)
 def test_the_image_is_recovered_from_straight_lines(name):
     camera = Camera(SIZE, K, LENSES[name], lens_frame=L)
@@ -213,11 +215,13 @@ def test_a_robust_loss_forgives_a_corner_that_was_misread():
     )
 
 
+@pytest.mark.slow
 def test_held_out_error_works_on_it():
     error = held_out(corners(NARROW, views=8, noise_px=0.1), partial(nmldc, lens="brown"))
     assert 0.1 < error.rms_px < 0.2  # the noise is 0.14 px per point
 
 
+@pytest.mark.slow
 @pytest.mark.datasets
 def test_lines_alone_come_within_a_tenth_of_the_full_calibration_on_real_photographs(datasets):
     table = np.load(datasets / "opencv-left" / "corners.npz")

@@ -18,7 +18,8 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
 from orthoscope.models.lenses import Rational
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.targets.detections import Detections, SetAside, Target, View, chessboard
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.target import Target, chessboard
 
 Spoil = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 
@@ -94,6 +95,7 @@ def moved(clean: Detections, left: Detections, lens: str) -> float:
     return float(np.hypot(*apart.T).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [anywhere, shifted])
 @pytest.mark.parametrize("lens", CAMERAS)
 def test_a_fifth_of_gross_outliers_is_named_to_the_last_and_moves_the_camera_by_less_than_a_tenth_of_a_pixel(
@@ -134,6 +136,7 @@ def test_every_corner_is_in_a_view_or_among_the_outliers_with_its_pixel_and_how_
     )  # noise of 0.1 px and one digit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_px", [0.0, 0.1, 1.0])
 @pytest.mark.parametrize("lens", CAMERAS)
 def test_of_photographs_without_outliers_everything_stays(lens: str, noise_px: float):

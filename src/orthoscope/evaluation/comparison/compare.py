@@ -20,11 +20,12 @@ import numpy as np
 
 from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
 from orthoscope.evaluation.metrics import held_out_nce
-from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views, held_out
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.methods import METHODS
 from orthoscope.methods.outliers.outliers import without_outliers
+from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
 __all__ = ["Comparison", "Standing", "compare", "paired_difference"]
@@ -36,16 +37,25 @@ Progress = Callable[[int, int, str], None]
 class Standing:
     """How an entry did; NaN where it could not be judged, and `failure` says why.
 
-    calibration: from all views. squares: of each view the sum of squared held-out residuals (m,), px^2.
-    held_out_px, error_px: rms per point and its standard error. loses_px, loses_error_px: against the best,
-    paired by view. nce: of held-out views. rms_px: on the photographs that were used. parameters: how many of
-    camera and target shape the data determined; NaN where the method does not tell. seconds: that the
-    calibration from all views took.
+    Args:
+        entry: the method with its settings.
+        squares: (m,) of each view the sum of squared held-out residuals, px^2.
+        camera, target_shape: calibrated from all views; None where they tell no camera.
+        lens: the lens that it came to, as the method's setting names it.
+        held_out_px, error_px: rms per point and its standard error.
+        loses_px, loses_error_px: against the best, paired by view.
+        nce: of held-out views.
+        rms_px: on the photographs that were used.
+        parameters: how many of camera and target shape the data determined; NaN where it is not told.
+        seconds: that the calibration from all views took.
+        failure: why it could not be judged.
     """
 
     entry: Entry
     squares: Float[ndarray, " m"]
-    calibration: Calibration | None = None
+    camera: Camera | None = None
+    target_shape: TargetShape | None = None
+    lens: str = ""
     held_out_px: float = float("nan")
     error_px: float = float("nan")
     loses_px: float = float("nan")
@@ -57,14 +67,9 @@ class Standing:
     failure: str = ""
 
     @property
-    def lens(self) -> str:
-        """The lens that it came to; empty without a calibration."""
-        return str(self.calibration.settings.get("lens", "")) if self.calibration else ""
-
-    @property
     def shape(self) -> str:
-        """The kind of target shape that it came to; empty without a calibration."""
-        return self.calibration.target_shape.kind if self.calibration else ""
+        """The kind of target shape that it came to; empty without a camera."""
+        return self.target_shape.kind if self.target_shape else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +176,9 @@ def _calibrated(entry: Entry, used: Detections, clock: Callable[[], float]) -> S
         return Standing(entry, squares, failure=str(error))
     seconds = clock() - begun
     known = found.parameters if found.uncertainty.names else float("nan")
-    return Standing(entry, squares, found, rms_px=found.rms_px, parameters=known, seconds=seconds)
+    lens = str(found.settings.get("lens", ""))
+    came_to = Standing(entry, squares, found.camera, found.target_shape, lens)
+    return replace(came_to, rms_px=found.rms_px, parameters=known, seconds=seconds)
 
 
 def _judged(
@@ -184,7 +191,7 @@ def _judged(
     """The same with its held-out errors; an entry that has none in some view is not compared, since the
     others meet them all.
     """
-    if standing.calibration is None:
+    if standing.camera is None:
         return standing
     refit = partial(METHODS[standing.entry.method], **standing.entry.settings)
     unseen = held_out(used, refit, folds=folds, executor=executor, progress=progress)

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
+from orthoscope.geometry.numbers import with_error
 from orthoscope.methods.decoupled.model_selection import SURELY
 
-__all__ = ["as_good_as_best", "conclusions", "with_error"]
+__all__ = ["as_good_as_best", "conclusions"]
 
 
 def conclusions(comparison: Comparison) -> tuple[str, ...]:
@@ -50,16 +49,6 @@ def as_good_as_best(comparison: Comparison) -> tuple[Standing, ...]:
         for standing in comparison.judged[1:]
         if standing.loses_px <= SURELY * standing.loses_error_px
     )
-
-
-def with_error(value: float, error: float) -> str:
-    """`0.067 ± 0.006`: three decimals, or four where the error would not show; without it where it is not
-    known.
-    """
-    if not np.isfinite(error):
-        return f"{value:.3f}"
-    places = 4 if 0.00005 <= error < 0.001 else 3
-    return f"{value:.{places}f} ± {error:.{places}f}"
 
 
 def _as_good(others: Sequence[Standing]) -> str:

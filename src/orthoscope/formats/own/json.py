@@ -1,5 +1,5 @@
-"""Our own files: `detections.json`, `calibration.json`, `camera.json` and a simulated scene's `truth.json`,
-saved and loaded.
+"""Our own files, saved and loaded: `detections.json`, `calibration.json`, `evaluation.json`, `camera.json`,
+`comparison.json` and a simulated scene's `truth.json`.
 
 Each is one JSON object that opens with what it is and in which format: {"orthoscope": "calibration",
 "format": 1, ...}. What is loaded equals what was saved to the last bit, and the same thing saved twice gives
@@ -8,30 +8,48 @@ the same bytes.
 
 from __future__ import annotations
 
+import importlib
 import re
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from orthoscope.files.whole_files import read_bytes, write_text
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.formats.own.json_layout import lay_out
-from orthoscope.formats.own.schema import CalibrationFile, CameraFile, DetectionsFile, SceneFile
 from orthoscope.geometry.arrays import InputError
 from orthoscope.models.camera import Camera
 from orthoscope.simulation.scene import Scene
 from orthoscope.targets.detections import Detections
 
-__all__ = ["load", "load_calibration", "load_camera", "load_detections", "save"]
+if TYPE_CHECKING:
+    from orthoscope.evaluation.comparison.compare import Comparison
+    from orthoscope.evaluation.evaluate import Evaluation
+
+__all__ = [
+    "camera_in",
+    "load",
+    "load_calibration",
+    "load_camera",
+    "load_detections",
+    "load_evaluation",
+    "save",
+    "text_of",
+]
 
 FORMAT = 1
-KINDS: dict[str, tuple[type, Any]] = {  # what a file says it is: the type in memory, the schema on disk
-    "detections": (Detections, DetectionsFile),
-    "calibration": (Calibration, CalibrationFile),
-    "camera": (Camera, CameraFile),
-    "scene": (Scene, SceneFile),
+KINDS = {  # what a file says it is: the type in memory, the schema on disk and where that stands
+    "detections": ("Detections", "DetectionsFile", "schema"),
+    "calibration": ("Calibration", "CalibrationFile", "schema"),
+    "evaluation": ("Evaluation", "EvaluationFile", "evaluation_schema"),
+    "comparison": ("Comparison", "ComparisonFile", "comparison_schema"),
+    "camera": ("Camera", "CameraFile", "schema"),
+    "scene": ("Scene", "SceneFile", "schema"),
 }
+CALIBRATION = "calibration.json"  # what an evaluation judges: the file of this name beside its own
 
 
 class _Header(msgspec.Struct):
@@ -39,46 +57,74 @@ class _Header(msgspec.Struct):
     format: int = 0
 
 
-def _document(schema: type) -> type:
+@cache
+def _schema(kind: str) -> Any:
+    """What objects of a kind are written with; imported when it is first asked for, since few verbs judge."""
+    _, name, module = KINDS[kind]
+    return getattr(importlib.import_module(f"orthoscope.formats.own.{module}"), name)
+
+
+@cache
+def _document(kind: str) -> Any:
     """The schema of a whole file: the header's fields and the thing's own."""
-    header = [("orthoscope", str), ("format", int)]
+    schema, header = _schema(kind), [("orthoscope", str), ("format", int)]
     return msgspec.defstruct(schema.__name__, header, bases=(schema,), kw_only=True)
 
 
-DOCUMENTS = {kind: _document(schema) for kind, (_, schema) in KINDS.items()}
+def text_of(thing: Detections | Calibration | Evaluation | Comparison | Camera | Scene) -> str:
+    """What `save` writes, one JSON object.
 
-
-def save(thing: Detections | Calibration | Camera | Scene, path: str | Path) -> None:
-    """Writes detections, a calibration, a camera or a scene to a file of our own, as a whole.
-
-    Raises InputError where the place cannot be written or a setting has no plain value.
+    Raises:
+        InputError: a setting has no plain value, or this is nothing that has a file.
     """
-    for kind, (core, schema) in KINDS.items():
-        if isinstance(thing, core):
-            try:
-                text = lay_out(
-                    {"orthoscope": kind, "format": FORMAT, **msgspec.to_builtins(schema.of(thing))}
-                )
-            except (TypeError, ValueError) as error:
-                raise InputError(
-                    f"the {kind} for {path} cannot be written as JSON ({error}); expected plain, finite"
-                    " values."
-                ) from error
-            return write_text(path, text + "\n")
-    raise InputError(f"{type(thing).__name__} cannot be saved; expected one of {', '.join(KINDS)}.")
+    kinds = {core: kind for kind, (core, *_) in KINDS.items()}
+    if (kind := kinds.get(type(thing).__name__)) is None:
+        raise InputError(f"{type(thing).__name__} cannot be saved; expected one of {', '.join(KINDS)}.")
+    try:
+        plain = msgspec.to_builtins(_schema(kind).of(thing))
+        return lay_out({"orthoscope": kind, "format": FORMAT, **plain}) + "\n"
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"the {kind} cannot be written as JSON ({error}); expected plain, finite values."
+        ) from error
 
 
-def load(path: str | Path) -> Detections | Calibration | Camera | Scene:
+def save(
+    thing: Detections | Calibration | Evaluation | Comparison | Camera | Scene, path: str | Path
+) -> None:
+    """Writes one of our things to a file of our own, as a whole.
+
+    An evaluation is loaded with the calibration that it judges: save that beside it, as calibration.json.
+
+    Raises:
+        InputError: the place cannot be written, or a setting has no plain value.
+    """
+    write_text(path, text_of(thing))
+
+
+def load(path: str | Path) -> Any:
     """Whatever one of our files holds.
 
-    Raises InputError for a file that is missing, cut off, of another program or of a newer version, and for
-    values that cannot be.
+    Raises:
+        InputError: the file is missing, cut off, of another program or of a newer version, has values that
+            cannot be, or is an evaluation of another calibration than the one beside it.
     """
-    content = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
+    return _loaded(read_bytes(path), path)
+
+
+def _loaded(content: bytes, path: str | Path) -> Any:
+    """What the bytes of a file of ours hold; errors as `load`."""
+    content = content.removeprefix(b"\xef\xbb\xbf")
     kind = _kind(content, path)
+    judged = [load_calibration(Path(path).with_name(CALIBRATION))] if kind == "evaluation" else []
+    return _thing(content, kind, path, judged)
+
+
+def _thing(content: bytes, kind: str, path: str | Path, judged: Sequence[Calibration] = ()) -> Any:
+    """What such content means; for an evaluation with the calibration that it judges."""
     try:
-        return msgspec.json.decode(content, type=DOCUMENTS[kind]).core()
-    except (msgspec.ValidationError, InputError) as error:
+        return msgspec.json.decode(content, type=_document(kind)).core(*judged)
+    except (msgspec.ValidationError, InputError, OverflowError) as error:
         what = str(error).rstrip(".")
         raise InputError(
             f"{path} does not hold proper {kind} data: {what}. Mend that place or write the file again."
@@ -96,9 +142,31 @@ def load_calibration(path: str | Path) -> Calibration:
     return _expect(Calibration, load(path), path)
 
 
+def load_evaluation(path: str | Path, calibration: Calibration | None = None) -> Evaluation:
+    """The evaluation of a file.
+
+    Args:
+        path: such as camera/evaluation.json.
+        calibration: the one that it judges; by default calibration.json in the same folder.
+    Raises:
+        InputError: as `load`, or the file judges another calibration.
+    """
+    content = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
+    if (kind := _kind(content, path)) != "evaluation":
+        raise InputError(
+            f"{path} holds {_article(kind)}; expected an evaluation. Hand in the file that has it."
+        )
+    return _thing(content, kind, path, [calibration or load_calibration(Path(path).with_name(CALIBRATION))])
+
+
 def load_camera(path: str | Path) -> Camera:
     """The camera of a file, also out of a calibration or a scene; errors as `load`."""
-    thing = load(path)
+    return camera_in(read_bytes(path), path)
+
+
+def camera_in(content: bytes, path: str | Path) -> Camera:
+    """The camera in the bytes of a file of ours; errors as `load`."""
+    thing = _loaded(content, path)
     return _expect(Camera, thing.camera if isinstance(thing, Calibration | Scene) else thing, path)
 
 
@@ -111,8 +179,11 @@ def _expect(core: type, thing: Any, path: str | Path) -> Any:
 
 
 def _named(thing: Any) -> str:
-    kind = type(thing).__name__.lower()
-    return kind if kind.endswith("s") else f"a {kind}"
+    return _article(type(thing).__name__.lower())
+
+
+def _article(kind: str) -> str:
+    return kind if kind.endswith("s") else f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
 
 
 def _kind(content: bytes, path: str | Path) -> str:
@@ -121,6 +192,8 @@ def _kind(content: bytes, path: str | Path) -> str:
         header = msgspec.json.decode(content, type=_Header)
     except msgspec.ValidationError as error:
         raise InputError(_foreign(path)) from error
+    except RecursionError as error:
+        raise InputError(f"{path} nests without end; expected a file that orthoscope wrote.") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise InputError(_malformed(content, path, error)) from error
     if header.format > FORMAT:

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
+from orthoscope.formats.own.struct import FileStruct
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera, Intrinsics
@@ -24,36 +25,46 @@ from orthoscope.models.lenses import LENSES
 from orthoscope.models.spline import Displacement, Lattice
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.simulation.scene import Scene
-from orthoscope.targets.detections import Detections, Outlier, SetAside, Target, View
+from orthoscope.targets.board import Board
+from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.detections import Detections, Outlier, SetAside, View
+from orthoscope.targets.table import TARGETS, as_fields
+from orthoscope.targets.target import Target
 
 __all__ = ["CalibrationFile", "CameraFile", "DetectionsFile", "SceneFile"]
 
 Row = list[float]
 
 
-class _Struct(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """An object of a file; a field that has its default is left out."""
-
-
-class TargetFile(_Struct, kw_only=True):
+class TargetFile(FileStruct, kw_only=True):
     name: str
     grid: tuple[int, int] | None = None
     points: list[tuple[float, float, float]]
     lines: list[list[int]] = []
+    board: dict[str, Any] | None = None  # a chessboard is known by its grid
 
     @classmethod
     def of(cls, target: Target) -> TargetFile:
         lines = [line.tolist() for line in target.lines]
-        return cls(name=target.name, grid=target.grid, points=target.points.tolist(), lines=lines)
+        board = None if target.board is None or target.kind == Chessboard.kind else as_fields(target.board)
+        return cls(
+            name=target.name, grid=target.grid, points=target.points.tolist(), lines=lines, board=board
+        )
 
     def core(self) -> Target:
         points = np.array(self.points, dtype=float).reshape(-1, 3)
-        return Target(
-            self.name, points, tuple(np.array(line, dtype=np.int64) for line in self.lines), self.grid
-        )
+        lines = tuple(np.array(line, dtype=np.int64) for line in self.lines)
+        return Target(self.name, points, lines, self.grid, _board(self.board) if self.board else None)
 
 
-class ViewFile(_Struct):
+def _board(fields: dict[str, Any]) -> Board:
+    kind, rest = fields.get("kind"), {name: value for name, value in fields.items() if name != "kind"}
+    if kind not in TARGETS:
+        raise InputError(f"a target of kind {kind!r} is not known; expected one of {', '.join(TARGETS)}.")
+    return msgspec.convert(rest, TARGETS[kind])
+
+
+class ViewFile(FileStruct):
     image: str
     corners: list[tuple[int, float, float]]
 
@@ -66,7 +77,7 @@ class ViewFile(_Struct):
         return View(self.image, np.array(ids, dtype=np.int64), np.array(pixels, dtype=float).T)
 
 
-class DetectionsFile(_Struct):
+class DetectionsFile(FileStruct):
     image_size: tuple[int, int]
     target: TargetFile
     views: list[ViewFile]
@@ -92,7 +103,7 @@ class DetectionsFile(_Struct):
         return Detections(self.target.core(), self.image_size, views, aside, outliers)
 
 
-class IntrinsicsFile(_Struct, omit_defaults=False):
+class IntrinsicsFile(FileStruct, omit_defaults=False):
     fx: float
     fy: float
     cx: float
@@ -103,7 +114,7 @@ class IntrinsicsFile(_Struct, omit_defaults=False):
         return Intrinsics(self.fx, self.fy, self.cx, self.cy, self.skew)
 
 
-class DisplacementFile(_Struct):
+class DisplacementFile(FileStruct):
     origin: Row
     step: Row
     shape: tuple[int, int]
@@ -124,7 +135,7 @@ class DisplacementFile(_Struct):
         )
 
 
-class LensFile(_Struct):
+class LensFile(FileStruct):
     """A formula of LENSES; with a displacement `over` it, a free lens."""
 
     name: str
@@ -154,7 +165,7 @@ class LensFile(_Struct):
         return FreeLens(formula, self.over.core()) if self.over else formula
 
 
-class CameraFile(_Struct):
+class CameraFile(FileStruct):
     image_size: tuple[int, int]
     intrinsics: IntrinsicsFile
     lens: LensFile
@@ -176,7 +187,7 @@ class CameraFile(_Struct):
         )
 
 
-class PoseFile(_Struct):
+class PoseFile(FileStruct):
     rotation: tuple[Row, Row, Row]
     translation: Row
 
@@ -188,7 +199,7 @@ class PoseFile(_Struct):
         return Pose(_array(self.rotation), _array(self.translation))
 
 
-class UncertaintyFile(_Struct):
+class UncertaintyFile(FileStruct):
     names: list[str]
     covariance: list[Row]
 
@@ -206,7 +217,7 @@ class UncertaintyFile(_Struct):
         return Uncertainty(tuple(self.names), _array(self.covariance))
 
 
-class TargetShapeFile(_Struct):
+class TargetShapeFile(FileStruct):
     kind: str
     displacements: list[Row]
 
@@ -218,7 +229,7 @@ class TargetShapeFile(_Struct):
         return TargetShape(self.kind, _array(self.displacements).reshape(-1, 3))
 
 
-class CalibrationFile(_Struct, kw_only=True):
+class CalibrationFile(FileStruct, kw_only=True):
     version: str
     camera: CameraFile
     uncertainty: UncertaintyFile
@@ -276,7 +287,7 @@ class CalibrationFile(_Struct, kw_only=True):
         )
 
 
-class SceneFile(_Struct):
+class SceneFile(FileStruct):
     camera: CameraFile
     target: TargetFile
     camera_from_target: list[PoseFile]

@@ -39,7 +39,7 @@ from orthoscope.methods.mldc.straightened_lines import distances
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 
 __all__ = ["CorrectedPoints", "Eq7"]
 

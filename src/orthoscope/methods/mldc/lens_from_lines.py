@@ -30,7 +30,7 @@ from orthoscope.models.lens import Formula
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import Options, Solution, shared_covariance, solve
 from orthoscope.solve.losses import Cauchy, Linear, Loss
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 
 __all__ = ["MEASURES", "StraightLens", "fit_straight_lens"]
 

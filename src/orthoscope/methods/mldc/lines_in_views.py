@@ -12,7 +12,7 @@ import numpy as np
 
 from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import Bool, CalibrationError, Int, ndarray
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 
 __all__ = ["FEWEST", "SeenLines"]
 

@@ -40,9 +40,7 @@ def comparison_errors(comparison: Comparison) -> Figure:
     for row, standing in enumerate(standings):
         if not np.isfinite(standing.held_out_px):
             place = {"transform": left.get_yaxis_transform(), "va": "center", "color": GREY}
-            left.text(
-                0.01, row, "no camera" if standing.calibration is None else "not in every view", **place
-            )
+            left.text(0.01, row, "no camera" if standing.camera is None else "not in every view", **place)
     return figure
 
 

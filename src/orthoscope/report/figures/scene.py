@@ -16,7 +16,7 @@ from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.report.figures.style import BLUE, INK, ORANGE, RED, WIDTH, styled
-from orthoscope.targets.detections import Target
+from orthoscope.targets.target import Target
 
 __all__ = ["board_poses"]
 

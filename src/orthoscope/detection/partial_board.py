@@ -1,0 +1,272 @@
+"""Which part of a chessboard a lattice of corners is: its corners' ids, as far as the board determines them.
+
+The lattice is laid out as a grid (rows, columns) whose gaps are filled from their neighbours, and cleared of
+corners that are none: where the four squares around are not bright and dark by turns as everywhere else. At
+each of its four sides it then either *goes on* (the next line has such corners too: it is taken in), or
+*ends* (the
+squares beyond the last corners are there, and behind them white paper: this is the board's own side), or
+neither
+can be seen: the picture stops there, a hand is in the way. A placement of the lattice on the board is a
+quarter turn and a shift; it stands if black squares come to lie on black ones, if sides that end are the
+board's sides, and if nothing reaches over them. One placement, or several that are the same but for the
+board's own symmetry, give the ids; more than one leave them open.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.detection.grid import grid_shape, lattice, one_line_more
+from orthoscope.detection.lattices import Lattice
+from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
+
+__all__ = ["Grid", "alternating", "filled", "grid_of", "laid_out", "placements"]
+
+FARTHEST_STRAY = 0.3  # of a step, from the parabolas of a corner's row and column
+LEAST_CONTRAST = 0.3  # of the usual strength of a corner
+LINE_GOES_ON = 0.6  # of the corners of a line that are in the picture
+LINE_ENDS = 0.75  # of its squares: they alternate, and behind the black ones is white
+THIN = 0.34  # of the next line's corners: a line at the rim with fewer, and fewer than three, is chance
+LINES_BEFORE = 4  # which a line is compared with
+
+
+class Grid(NamedTuple):
+    """A lattice as a grid.
+
+    Args:
+        corners: (rows, columns, 2) pixels, gaps filled.
+        seen: (rows, columns) whether a corner was seen there.
+        bright: whether the square between +column and +row of the first corner is the bright one.
+        ends: whether the board ends at the first row, the last column, the last row, the first column.
+    """
+
+    corners: Float[ndarray, "r c 2"]
+    seen: Bool[ndarray, "r c"]
+    bright: bool
+    ends: tuple[bool, bool, bool, bool]
+
+
+def laid_out(grey: ndarray, found: Lattice, most: int) -> Grid | None:
+    """The grid of a lattice, cleared, filled and taken as far as it goes; None where nothing is left of it.
+
+    Args:
+        grey: (h,w) uint8, the picture in which the lattice was found.
+        found: the lattice.
+        most: lines that are added at most.
+    """
+    kept = _without_strays(found)
+    if kept is None:
+        return None
+    columns, rows = kept.size
+    corners = np.full((rows, columns, 2), np.nan)
+    corners[kept.cells[:, 1], kept.cells[:, 0]] = kept.pixels
+    first = int(np.abs(kept.cells).sum(1).argmin())
+    bright = bool(kept.bright[first]) ^ bool(kept.cells[first].sum() % 2)
+    seen = np.isfinite(corners[..., 0])
+    seen &= _stands(grey, filled(corners), bright)
+    corners[~seen] = np.nan
+    box = _box(seen)
+    if box is None:
+        return None
+    bright ^= bool((box[0].start + box[1].start) % 2)
+    grid, seen = filled(corners[box]), seen[box]
+    seen |= _stands(grey, grid, bright)
+    return _taken_further(grey, grid, seen, bright, most)
+
+
+def placements(grid: Grid, columns: int, rows: int) -> list[Int[ndarray, "r c"]]:
+    """Ids (rows, columns) of the grid's corners, seen or not, for each way it can lie on a board."""
+    as_said, inverted = [], []
+    for quarters in range(4):
+        seen = np.rot90(grid.seen, quarters)
+        height, width = seen.shape
+        if width > columns or height > rows:
+            continue
+        top, right, bottom, left = np.roll(grid.ends, -quarters)
+        # the first corner of the turned grid, and whether bright lies between its own +column and +row
+        sum_of_first = np.rot90(np.add.outer(*(np.arange(side) for side in grid.seen.shape)), quarters)[0, 0]
+        bright = grid.bright ^ bool(sum_of_first % 2) ^ bool(quarters % 2)
+        for row in range(rows - height + 1):
+            for column in range(columns - width + 1):
+                dark = (row + column) % 2 == 0  # between +column and +row of such corners
+                if (top and row) or (left and column):
+                    continue
+                if (bottom and row + height < rows) or (right and column + width < columns):
+                    continue
+                ids = np.add.outer((np.arange(height) + row) * columns, np.arange(width) + column)
+                (inverted if dark == bright else as_said).append(np.rot90(ids, -quarters))
+    if (columns + rows) % 2 or (columns == rows and columns % 2):  # white for black is the board turned
+        return as_said
+    whole = grid.seen.size == columns * rows
+    return (as_said or inverted) if whole else [*as_said, *inverted]
+
+
+def grid_of(grey: ndarray, corners: Float[ndarray, "r c 2"], most: int) -> Grid:
+    """The grid of corners that some finder returned, taken as far as it goes."""
+    bright = bool(alternating(grey, corners).sum() > 0)
+    return _taken_further(grey, corners, np.ones(corners.shape[:2], dtype=bool), bright, most)
+
+
+def filled(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "r c 2"]:
+    """The grid with its gaps filled: each from those of its neighbours whose lines foresee it, near ones
+    first.
+    """
+    grid = grid.copy()
+    while np.isnan(grid[..., 0]).any():
+        told = np.stack([part for turn in range(4) for part in _foreseen(grid, turn)])
+        known = np.isfinite(told[..., 0])
+        count = known.sum(0)
+        new = np.isnan(grid[..., 0]) & (count > 0)
+        if not new.any():
+            return np.where(np.isnan(grid), -1e4, grid)  # far outside: nothing foresees it
+        total = np.where(known[..., None], told, 0.0).sum(0)
+        grid[new] = (total / np.maximum(count, 1)[..., None])[new]
+    return grid
+
+
+def _foreseen(grid: ndarray, turn: int) -> list[ndarray]:
+    """Each place from the two before it on its line, the two beside it, and three of a parallelogram."""
+    turned = np.rot90(grid, turn)
+    straight, slanted, between = (np.full_like(turned, np.nan) for _ in range(3))
+    between[:, 1:-1] = 0.5 * (turned[:, 2:] + turned[:, :-2])
+    straight[:, 2:] = 2.0 * turned[:, 1:-1] - turned[:, :-2]
+    slanted[1:, 1:] = turned[1:, :-1] + turned[:-1, 1:] - turned[:-1, :-1]
+    return [np.rot90(part, -turn) for part in (straight, slanted, between)]
+
+
+def _without_strays(found: Lattice) -> Lattice | None:
+    """The lattice without corners that are off their neighbours' lines, the worst first."""
+    pixels, cells, bright = found
+    for _ in range(len(pixels)):
+        if len(pixels) < 4:
+            return None
+        stray = grid_shape(pixels, cells.astype(float)).stray
+        worst = int(stray.argmax())
+        if stray[worst] <= FARTHEST_STRAY:
+            break
+        keep = np.arange(len(pixels)) != worst
+        pixels, cells, bright = pixels[keep], cells[keep], bright[keep]
+    cells = cells - cells.min(0)
+    return Lattice(pixels, cells, bright)
+
+
+def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:
+    """Where the squares around a corner are bright and dark as they must be there, with contrast enough."""
+    strength = alternating(grey, grid) * (1.0 if bright else -1.0)
+    usual = np.median(strength[strength > 0]) if (strength > 0).any() else np.inf
+    return strength > LEAST_CONTRAST * usual
+
+
+def _box(seen: Bool[ndarray, "r c"]) -> tuple[slice, slice] | None:
+    """Rows and columns with corners, thin lines at the rim left out."""
+    top, bottom, left, right = 0, seen.shape[0], 0, seen.shape[1]
+    while bottom - top >= 2 and right - left >= 2:
+        part = seen[top:bottom, left:right]
+        lines = [
+            (part[0], part[1]),
+            (part[-1], part[-2]),
+            (part[:, 0], part[:, 1]),
+            (part[:, -1], part[:, -2]),
+        ]
+        thin = [
+            line.sum() == 0 or (line.sum() < 3 and line.sum() < THIN * next_.sum()) for line, next_ in lines
+        ]
+        if not any(thin):
+            return slice(top, bottom), slice(left, right)
+        top, bottom, left, right = top + thin[0], bottom - thin[1], left + thin[2], right - thin[3]
+    return None
+
+
+def _taken_further(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool, most: int) -> Grid:
+    """The grid with the lines beyond its sides, as long as they go on; and which of its sides end."""
+    ends = []
+    for _ in range(4):  # the last row in turn, by turning the grid
+        for _ in range(most):
+            if len(grid) < 2:
+                break
+            more = (
+                one_line_more(grid) if len(grid) > 2 else np.concatenate([grid, 2 * grid[-1:] - grid[-2:-1]])
+            )
+            stands = _next_line_stands(grey, more, bright)
+            if not stands.any() or stands.sum() < LINE_GOES_ON * _in_picture(grey, more[-1]).sum():
+                break
+            grid, seen = more, np.concatenate([seen, stands[None]])
+        ends.append(_ends(grey, grid))
+        grid, seen = np.rot90(grid), np.rot90(seen)  # what was the last column is now the first row
+        bright = bright ^ bool((grid.shape[0] - 1) % 2) ^ True
+    # np.rot90 brings the right side to the top, so the last row in turn was: bottom, left, top, right
+    bottom, left, top, right = ends
+    return Grid(grid, seen, bright, (top, right, bottom, left))
+
+
+def _next_line_stands(grey: ndarray, more: ndarray, bright: bool) -> ndarray:
+    """Which corners of the last row are the board's, as those of the rows before it are."""
+    strength = alternating(grey, more)[-1 - LINES_BEFORE :] * (1.0 if bright else -1.0)
+    before = strength[:-1]
+    usual = np.median(before[before > 0]) if (before > 0).any() else np.inf
+    return strength[-1] > 0.5 * usual
+
+
+def _ends(grey: ndarray, grid: ndarray) -> bool:
+    """Whether the board ends behind the last row: one more row of squares, then white paper."""
+    if len(grid) < 2:
+        return False
+    last, step = grid[-1], grid[-1] - grid[-2]
+    middle, out = 0.5 * (last[1:] + last[:-1]), 0.5 * (step[1:] + step[:-1])
+    places = np.stack([middle + share * out for share in (-0.5, 0.5, 0.75, 1.3)])  # (4, columns - 1, 2)
+    inside = _in_picture(grey, places).all(0)
+    if inside.sum() < max(2, 0.5 * len(middle)):
+        return False
+    x, y = np.clip(np.rint(places).astype(int), 0, np.array(grey.shape[::-1]) - 1)[:, inside].transpose(
+        2, 0, 1
+    )
+    before, near, far, beyond = grey[y, x].astype(float)
+    level = 0.5 * (before + near)  # one of the two squares is bright, the other dark
+    contrast = 0.25 * np.abs(near - before)
+    dark = near < before
+    same = np.abs(far - near) < 2.0 * contrast
+    alternates = np.abs(near - before) > 0.5 * np.median(np.abs(near - before))
+    paper = beyond > level
+    return bool((same & alternates).mean() >= LINE_ENDS and dark.any() and paper[dark].mean() >= LINE_ENDS)
+
+
+def _in_picture(grey: ndarray, places: ndarray) -> ndarray:
+    return np.all((places >= 0) & (places <= np.array(grey.shape[::-1]) - 1), axis=-1)
+
+
+def alternating(grey: ndarray, grid: ndarray) -> Float[ndarray, "r c"]:
+    """How much brighter the square between +column and +row and its opposite are than the two others, grey
+    levels, every other corner's sign turned: a board has one sign throughout. 0 where they are not two and
+    two.
+    """
+    rows, columns = grid.shape[:2]
+    strength = strengths(grey, grid)
+    return strength * np.where(np.add.outer(np.arange(rows), np.arange(columns)) % 2, -1.0, 1.0)
+
+
+def strengths(grey: ndarray, grid: ndarray) -> Float[ndarray, "r c"]:
+    """How much brighter the square between +column and +row and its opposite are than the two others, grey
+    levels.
+
+    Negative where they are darker; 0 where the four squares are not two and two, or one of them is not in the
+    picture.
+    """
+    rows, columns = grid.shape[:2]
+    corners = grid.reshape(-1, 2)
+    shape = grid_shape(corners, lattice(columns, rows))
+    steps = np.array([0.15, 0.25, 0.35])  # squares from the corner
+    along = np.array([1, -1, 1, -1])[:, None, None] * steps[:, None]
+    down = np.array([1, -1, -1, 1])[:, None, None] * steps
+    a, d = (part.reshape(1, 4, -1, 1) for part in np.broadcast_arrays(along, down))
+    places = (
+        corners[:, None, None] + a * shape.along[:, None, None] + d * shape.down[:, None, None]
+    )  # (m, 4 squares, 9, 2)
+    height, width = grey.shape
+    x, y = np.rint(np.clip(places, -9e5, 9e5)).astype(int).transpose(3, 0, 1, 2)
+    inside = ((x >= 0) & (x < width) & (y >= 0) & (y < height)).all((1, 2))
+    squares = grey[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)].mean(-1)  # (m, 4)
+    bright = squares[:, :2].min(1) - squares[:, 2:].max(1)
+    dark = squares[:, 2:].min(1) - squares[:, :2].max(1)
+    return np.where(inside, np.maximum(bright, 0.0) - np.maximum(dark, 0.0), 0.0).reshape(rows, columns)

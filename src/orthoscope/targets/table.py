@@ -1,0 +1,39 @@
+"""The kinds of target by name: an entry more, and descriptions, files, pictures and detectors know it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from orthoscope.geometry.arrays import InputError
+from orthoscope.targets.board import Board
+from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.target import Target, target_of
+
+__all__ = ["TARGETS", "as_fields", "forms", "parse_target"]
+
+TARGETS: dict[str, type[Board]] = {board.kind: board for board in (Chessboard,)}
+
+
+def forms() -> str:
+    """How every kind is described, for help and messages."""
+    return ", ".join(f"{board.kind}:{board.form} ({board.counted})" for board in TARGETS.values())
+
+
+def parse_target(text: str) -> Target:
+    """The target of a description such as `chessboard:9x6:25mm`.
+
+    Raises:
+        InputError: the description is none.
+    """
+    kind, *fields = text.strip().split(":")
+    if kind not in TARGETS:
+        raise InputError(
+            f"target {text!r} is not understood; expected {forms()}, such as {Chessboard.example}."
+        )
+    return target_of(TARGETS[kind].parse(fields))
+
+
+def as_fields(board: Board) -> dict[str, Any]:
+    """What a board is made of, by name, its kind first: plain values, as a file holds them."""
+    return {"kind": board.kind, **asdict(board)}
