@@ -103,7 +103,7 @@ class StraightenedLines:
 
 
 def distances(
-    points: Float[ndarray, "l w 2"], present: Float[ndarray, "l w"]
+    points: Float[ndarray, "l w 2"], present: ndarray
 ) -> tuple[Float[ndarray, "l w"], Float[ndarray, "l w w 2"]]:
     """Distances of points from the line nearest to them, for each of many lines, and their slopes by the
     points.
@@ -114,7 +114,7 @@ def distances(
 
     Args:
         points: of each line.
-        present: which of them there are.
+        present: (l,w) which of them there are.
     """
     present = present.astype(float)
     line = fitted_lines(points, present)
