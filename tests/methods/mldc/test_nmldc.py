@@ -271,7 +271,7 @@ def test_derivatives_of_lines_in_the_straightened_image_are_exact():
 def test_lines_in_the_straightened_image_suffer_most_from_noise():
     nce = {}
     for noise in (0.1, 1.0):
-        training, test = simulated("low", Condition(noise), seed=0, trial=0)
+        training, test = simulated("low", Condition(noise, (7, 10)), seed=0, trial=0)
         for measure in ("photograph", "straight-image"):
             found = nmldc(training, lens="pfet:a1,a2,a3,a4", measure=measure)
             nce[noise, measure] = evaluate_on(found.camera, test).nce
