@@ -13,6 +13,7 @@ import glob
 import re
 import threading
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager
 from os import PathLike
 from pathlib import Path
 
@@ -22,7 +23,7 @@ import numpy as np
 from orthoscope.files.whole_files import read_bytes, write_bytes
 from orthoscope.geometry.arrays import InputError, ndarray
 
-__all__ = ["SUFFIXES", "names_of", "photographs", "read_image", "write_image"]
+__all__ = ["SUFFIXES", "checked_whole", "names_of", "photographs", "quiet", "read_image", "write_image"]
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
 JPEG, PNG = b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"  # how they begin
@@ -68,14 +69,7 @@ def read_image(path: Path_, *, grey: bool = False) -> ndarray:
 
     Raises InputError where the file is missing, empty, no image or cut off.
     """
-    content = read_bytes(Path(path))
-    if not content:
-        raise InputError(f"{path} is empty; expected a photograph. Copy it again or leave it out.")
-    if not _is_whole(content):
-        raise InputError(
-            f"{path} is cut off ({len(content)} bytes without an end); expected a whole photograph. Copy it"
-            " again or leave it out."
-        )
+    content = checked_whole(read_bytes(Path(path)), path)
     flags = (cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) | cv2.IMREAD_ANYDEPTH
     with _QUIET:
         try:
@@ -88,6 +82,21 @@ def read_image(path: Path_, *, grey: bool = False) -> ndarray:
             " leave it out."
         )
     return _to_8_bits(image)
+
+
+def checked_whole(content: bytes, path: Path_) -> bytes:
+    """The bytes of a picture's file.
+
+    Raises InputError where there are none or they are cut off.
+    """
+    if not content:
+        raise InputError(f"{path} is empty; expected a photograph. Copy it again or leave it out.")
+    if not _is_whole(content):
+        raise InputError(
+            f"{path} is cut off ({len(content)} bytes without an end); expected a whole photograph. Copy it"
+            " again or leave it out."
+        )
+    return content
 
 
 def write_image(path: Path_, image: ndarray) -> None:
@@ -213,3 +222,8 @@ class _Quiet:
 
 
 _QUIET = _Quiet()
+
+
+def quiet() -> AbstractContextManager[None]:
+    """A block in which OpenCV keeps its remarks to itself."""
+    return _QUIET

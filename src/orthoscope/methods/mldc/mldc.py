@@ -41,6 +41,7 @@ from orthoscope.fitting.pinhole import fit_pinhole, pinhole_start
 from orthoscope.fitting.reprojection import Estimate
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.methods.fccm import fccm
 from orthoscope.methods.mldc.eq7 import Eq7
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, fit_centred_lens
@@ -95,6 +96,7 @@ class Found(NamedTuple):
     uncertainty: Uncertainty = Uncertainty((), np.empty((0, 0)))
 
 
+@with_one_thread
 def mldc(
     detections: Detections,
     *,
