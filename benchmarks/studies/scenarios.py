@@ -243,8 +243,8 @@ SCENARIOS: tuple[Scenario, ...] = (
         "5 % wild corners, fccm",
         _with(detectors=(("wild", 0.05),)),
         FLAT,
-        (GOOD, REGION, USABLE, NO),
-        (*FEW, "corners"),
+        (GOOD, REGION, USABLE, NO, REFUSED),
+        (*FEW, "corners", REFUSED),
     ),
     Scenario("one view found a row too low", _with(detectors=(("shifted", 1),))),
     Scenario("one view column by column", _with(detectors=(("transposed", 1),))),
@@ -252,13 +252,13 @@ SCENARIOS: tuple[Scenario, ...] = (
     Scenario(
         "one view blurred",
         _with(detectors=(("blurred", 1),)),
-        causes=("", "region", "views"),
+        causes=("", "region", "open", "views"),
         grades=(GOOD, REGION, USABLE),
     ),
     Scenario(
         "one view of another board",
         _with(detectors=(("another board", 1),)),
-        causes=("", "region", "views"),
+        causes=("", "region", "open", "views"),
         grades=(GOOD, REGION, USABLE),
     ),
     Scenario(

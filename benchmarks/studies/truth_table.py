@@ -185,7 +185,7 @@ def _summary(rows: Sequence[Row], of: dict[str, list[Row]]) -> list[str]:
     return [
         f"Written by `python -m benchmarks.studies.truth_table`: {len(of)} scenarios, {seeds} seeds each,",
         "made by cameras that are not this project's (`benchmarks/studies/projectors.py`), calibrated and",
-        "judged as a user would. What the grades mean, how the error is predicted: [verdict.md](../verdict.md).",
+        "judged as a user would. What the grades mean, how it is predicted: [verdict.md](../verdict.md).",
         "",
         "| what | found |",
         "|---|---|",

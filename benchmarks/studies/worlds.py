@@ -71,12 +71,14 @@ class World(NamedTuple):
         cameras: of each photograph as it was drawn, before detectors made mistakes.
         groups: of each photograph, which camera it was; all alike where there is but one.
         recipe: what it was made by.
+        distance: of the board in the typical photograph, metres.
     """
 
     photographs: list[Photograph]
     cameras: list[Projector]
     groups: list[int]
     recipe: Recipe
+    distance: float
 
 
 def made(recipe: Recipe, seed: int) -> World:
@@ -96,36 +98,44 @@ def made(recipe: Recipe, seed: int) -> World:
         photographs.append(Photograph(f"{i + 1:02d}.jpg", np.flatnonzero(inside), pixels[inside]))
     for name, amount in recipe.detectors:
         photographs = DETECTORS[name](photographs, amount, recipe, rng)
-    return World(photographs, cameras, groups, recipe)
+    distance = float(np.median([np.linalg.norm(translation) for _, translation in poses]))
+    return World(photographs, cameras, groups, recipe, distance)
 
 
 def true_error(world: World, pixels: ndarray, rays: ndarray) -> float:
-    """How far off an estimated camera is: rms over pixels, a rotation fitted out, against the true camera of
-    every photograph.
+    """How far off an estimated camera is: rms over pixels, against the true camera of every photograph.
+
+    A rotation is fitted out, of directions; behind a window in water, where no camera has a single centre, a
+    motion, of points at the target's distance.
 
     Args:
         pixels: (n,2) of the estimated camera's image.
         rays: (n,3) which it says they show; rows of NaN take no part.
     """
     known = np.isfinite(rays).all(1)
-    each = [_apart(camera, pixels[known], rays[known]) for camera in dict.fromkeys(world.cameras)]
+    each = [
+        _apart(camera, pixels[known], rays[known], world.distance) for camera in dict.fromkeys(world.cameras)
+    ]
     return float(np.sqrt(np.mean(np.square(each)))) if known.any() else float("nan")
 
 
-def _apart(camera: Projector, pixels: ndarray, rays: ndarray) -> float:
-    """Rms distance of the pixels from where the true camera, turned as fits best, sees the rays."""
-    turn, step = np.diag([-1.0, -1.0, 1.0]) if camera.turned else np.eye(3), 1e-5
+def _apart(camera: Projector, pixels: ndarray, rays: ndarray, distance: float) -> float:
+    """Rms distance of the pixels from where the true camera, moved as fits best, sees the points."""
+    turn, shift, step = np.diag([-1.0, -1.0, 1.0]) if camera.turned else np.eye(3), np.zeros(3), 1e-5
+    points = rays * distance
     off = np.full_like(pixels, np.nan)
     for _ in range(8):
-        turned = rays @ turn.T
-        off = camera.pixels(turned) - pixels
-        by_turn = np.stack(
-            [(camera.pixels(turned @ _turn(step * axis).T) - pixels - off) / step for axis in np.eye(3)], -1
-        )
-        good = np.isfinite(off).all(1) & np.isfinite(by_turn).all((1, 2))
+        moved = points @ turn.T + shift
+        off = camera.pixels(moved) - pixels
+        steps = [moved @ _turn(step * axis).T for axis in np.eye(3)]
+        steps += [moved + step * axis for axis in np.eye(3)] if camera.port else []
+        by_step = np.stack([(camera.pixels(stepped) - pixels - off) / step for stepped in steps], -1)
+        good = np.isfinite(off).all(1) & np.isfinite(by_step).all((1, 2))
         if good.sum() < 6:
             return float("inf")
-        turn = _turn(np.linalg.lstsq(by_turn[good].reshape(-1, 3), -off[good].ravel(), rcond=None)[0]) @ turn
+        least = np.linalg.lstsq(by_step[good].reshape(-1, len(steps)), -off[good].ravel(), rcond=None)[0]
+        turned = _turn(least[:3])
+        turn, shift = turned @ turn, turned @ shift + (least[3:] if camera.port else 0.0)
     good = np.isfinite(off).all(1)
     return float(np.sqrt((off[good] ** 2).sum(1).mean()))
 

@@ -91,8 +91,8 @@ def evaluated(calibration: Calibration, *, held_out: bool = True) -> Evaluation:
         verdict=Verdict(
             Grade.REGION,
             "",
-            "Good within a region: off by about 0.12 px where corners were seen, and by less than 0.5 px over 64"
-            " % of the frame.",
+            "Good within a region: off by about 0.12 px where corners were seen, and by less than 0.5 px over"
+            " 64 % of the frame.",
             "",
             "Photograph the target at the bottom left.",
         ),

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from orthoscope.files.images import write_image
-from orthoscope.formats.own.json import save
+from orthoscope.formats.own.json import load_evaluation, save
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.numbers import ABSENT
 from orthoscope.models.free_lens import FreeLens
@@ -396,4 +396,6 @@ def test_a_page_is_made_without_matplotlib_and_without_a_template_language(ordin
     )
     done = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "report.html").read_text() == report_page(ordinary)
+    assert (tmp_path / "report.html").read_text() == report_page(
+        load_evaluation(tmp_path / "evaluation.json")
+    )

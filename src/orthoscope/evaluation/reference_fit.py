@@ -26,6 +26,7 @@ from orthoscope.models.lenses import FREE, lens_name
 
 __all__ = ["ReferenceFit", "reference_fit"]
 
+AS_GOOD = 0.2  # of the error: a camera that is nearer to a fit of which all is known is that fit's
 FEWEST_VIEWS = 2  # with fewer, a free lens and a free target have nothing to be told by
 
 
@@ -68,10 +69,9 @@ def reference_fit(calibration: Calibration) -> ReferenceFit | None:
     error = predicted_error(
         own or of_richest, seen, distance=distance, richest=None if own is None else of_richest
     )
-    if own is None and not _is(
-        calibration, richest
-    ):  # nothing is known of its scatter: what is apart is its bias
-        apart = rms_difference(calibration.camera, known.camera, seen)
+    apart = rms_difference(calibration.camera, (own or of_richest).camera, seen)
+    if apart > AS_GOOD * error.seen_px:
+        # Not the minimum of a fit whose scatter is known: what is apart is its bias.
         error = replace(error, seen_px=float(np.hypot(error.seen_px, apart)), bias_px=apart)
     return ReferenceFit(known, left_out, richest.base, error, without, within)
 

@@ -1,5 +1,4 @@
-"""What the page says first: how far the camera may be trusted, in a word, a sentence and a colour; and what to
-do.
+"""What the page says first: how far the camera may be trusted, in a word, a sentence, a colour; what to do.
 
 Colours never speak alone: each grade has its word and its sign.
 """

@@ -163,7 +163,7 @@ CAUSES: tuple[Cause, ...] = (
     Cause("open", _open, _as_far_as_known, lambda s: "these photographs do not tell it better"),
     Cause(
         "solver",
-        lambda s: not s.converged,
+        lambda s: not s.converged and s.error_px > FINE_PX,
         lambda s: Grade.USABLE,
         lambda s: "the search for the camera did not come to an end",
     ),

@@ -88,10 +88,9 @@ class LensMisfitFile(FileStruct):
         return LensMisfit(self.test.core(), cells, array_of(self.residuals, self.rows, self.columns, 2))
 
 
-class CameraErrorFile(Record):
+class CameraErrorFile(FileStruct):
     """The maps are rows of the frame, top to bottom; the region is a polygon of pixels."""
 
-    CORE: ClassVar[type] = CameraError
     seen_px: Number
     frame_px: Number
     near_seen_px: Number
@@ -109,11 +108,7 @@ class CameraErrorFile(Record):
 
     @classmethod
     def of(cls, error: CameraError) -> CameraErrorFile:
-        numbers = {
-            field.name: null_for_nan(getattr(error, field.name))
-            for field in msgspec.structs.fields(cls)
-            if field.type == Number
-        }
+        numbers = {name: null_for_nan(getattr(error, name)) for name in cls._numbers()}
         region = [(float(x), float(y)) for x, y in error.region]
         without = rows_of(error.without_px)
         return cls(
@@ -121,14 +116,17 @@ class CameraErrorFile(Record):
         )
 
     def core(self) -> CameraError:
-        numbers = {
-            field.name: float("nan") if getattr(self, field.name) is None else getattr(self, field.name)
-            for field in msgspec.structs.fields(self)
-            if field.type == Number
+        numbers: dict[str, Any] = {
+            name: float("nan") if getattr(self, name) is None else getattr(self, name)
+            for name in self._numbers()
         }
-        maps = {name: array_of(getattr(self, name), len(getattr(self, name)), -1) for name in ("far", "near")}
-        lines = {"region": array_of(list(self.region), -1, 2), "without_px": array_of(self.without_px, -1)}
-        return CameraError(**lines, **maps, **numbers)
+        far, near = (array_of(rows, len(rows), -1) for rows in (self.far, self.near))
+        region, without = array_of(list(self.region), -1, 2), array_of(self.without_px, -1)
+        return CameraError(far=far, near=near, region=region, without_px=without, **numbers)
+
+    @classmethod
+    def _numbers(cls) -> list[str]:
+        return [field.name for field in msgspec.structs.fields(cls) if field.type == Number]
 
 
 class DisagreementFile(Record):
