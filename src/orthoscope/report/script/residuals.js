@@ -26,7 +26,7 @@ function byView() {
     labels: ["photograph", "rms (px per point)"],
     gridY: true,
     zoomsX: true,
-    margin: { l: 56, r: 14, t: 30, b: 42 },
+    margin: { l: 66, r: 14, t: 30, b: 42 },
     height: () => 210,
     ticksX: p => {
       const [from, to] = p.shown.x,
