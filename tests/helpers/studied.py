@@ -10,7 +10,8 @@ from pathlib import Path
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.methods.decoupled.candidates import Candidates, Model
 from orthoscope.models.lenses import FREE
-from orthoscope.targets.detections import Detections, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))  # benchmarks/ stands beside src/ and is no part of the package

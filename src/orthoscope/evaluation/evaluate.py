@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -170,7 +170,7 @@ def evaluate(
         warnings=calibration.assumptions,
         verdict=verdict_on(situation),
         error=found.reference.error if found.reference else None,
-        disagreement=found.disagreement,
+        disagreement=replace(found.disagreement, wishes=None),
         groups=found.groups,
         situation=situation,
     )

@@ -9,7 +9,7 @@ photograph is *precious*; more like it are what the camera needs.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,7 +29,8 @@ GAINED = 1.5  # times the typical left-out error
 FEWEST_VIEWS = 5
 
 
-class ViewError(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class ViewError:
     """One photograph's share.
 
     Args:

@@ -191,9 +191,9 @@ class EvaluationFile(FileStruct, kw_only=True):
     grade: str
     cause: str = ""
     situation: SituationFile
-    camera_error: CameraErrorFile | None = None
-    agreement: DisagreementFile
-    groups: GroupsFile | None = None
+    error: CameraErrorFile | None
+    disagreement: DisagreementFile
+    groups: GroupsFile | None
     warnings: list[str]
     rms_px: Number
     median_px: Number
@@ -224,8 +224,8 @@ class EvaluationFile(FileStruct, kw_only=True):
             grade=str(evaluation.verdict.grade),
             cause=evaluation.verdict.cause,
             situation=SituationFile.of(evaluation.situation),
-            camera_error=CameraErrorFile.of(evaluation.error) if evaluation.error else None,
-            agreement=DisagreementFile.of(evaluation.disagreement),
+            error=CameraErrorFile.of(evaluation.error) if evaluation.error else None,
+            disagreement=DisagreementFile.of(evaluation.disagreement),
             groups=GroupsFile.of(evaluation.groups) if evaluation.groups else None,
             **{name: null_for_nan(getattr(evaluation, name)) for name in NUMBERS},
         )
@@ -259,8 +259,8 @@ class EvaluationFile(FileStruct, kw_only=True):
             suspects=tuple(self.suspects),
             warnings=tuple(self.warnings),
             verdict=verdict_on(situation),
-            error=self.camera_error.core() if self.camera_error else None,
-            disagreement=self.agreement.core(),
+            error=self.error.core() if self.error else None,
+            disagreement=self.disagreement.core(),
             groups=self.groups.core() if self.groups else None,
             situation=situation,
             **numbers,
