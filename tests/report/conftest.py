@@ -10,13 +10,8 @@ import pytest
 from orthoscope.evaluation.camera_error import CameraError
 from orthoscope.evaluation.evaluate import Evaluation, ViewError
 from orthoscope.evaluation.misfit.misfit import misfit
-<<<<<<< HEAD
 from orthoscope.evaluation.verdict.grades import Grade
 from orthoscope.evaluation.verdict.verdict import Verdict
-=======
-from orthoscope.evaluation.verdict.situation import Situation
-from orthoscope.evaluation.verdict.verdict import verdict_on
->>>>>>> page
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty, rms
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.models.camera import Camera, Intrinsics
@@ -25,7 +20,6 @@ from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections, SetAside, View
 from orthoscope.targets.target import Target, chessboard
 
-KNOWN = Situation(error_px=0.24, share=0.9, covered=0.87)
 NOISE = 0.15  # px per coordinate
 PRINT = np.stack(
     [1e-3 * np.sin(np.arange(54)), 2e-4 * (np.arange(54) // 9), 2e-3 * np.cos(np.arange(54) // 9)], axis=-1
@@ -94,7 +88,6 @@ def evaluated(calibration: Calibration, *, held_out: bool = True) -> Evaluation:
         held_out_residuals=tuple(factor * e for e in residuals),
         suspects=(),
         warnings=(),
-<<<<<<< HEAD
         verdict=Verdict(
             Grade.REGION,
             "",
@@ -127,10 +120,6 @@ def _camera_error(calibration: Calibration) -> CameraError:
         limit_px=0.24,
         region=region,
         without_px=0.01 * (1.0 + np.arange(views) % 5),
-=======
-        verdict=verdict_on(KNOWN),
-        situation=KNOWN,
->>>>>>> page
     )
 
 

@@ -214,11 +214,7 @@ def test_hostile_words_do_not_become_markup(ordinary):
         replace(
             ordinary,
             calibration=calibration,
-<<<<<<< HEAD
             verdict=ordinary.verdict._replace(far=words, limit=words, advice=words),
-=======
-            verdict=ordinary.verdict._replace(far=words),
->>>>>>> page
             warnings=(words,),
             suspects=((words, words),),
         )
@@ -229,13 +225,9 @@ def test_hostile_words_do_not_become_markup(ordinary):
 
 def test_the_page_says_the_verdict_the_suspects_the_assumptions_and_how_it_was_made(pages, every_evaluation):
     words = {kind: " ".join(" ".join(Page(page).words).split()) for kind, page in pages.items()}
-<<<<<<< HEAD
     verdict = every_evaluation["ordinary"].verdict
     assert f"{verdict.grade} Off by about 0.12 px where corners were seen" in words["ordinary"]
     assert verdict.advice in words["ordinary"]
-=======
-    assert str(every_evaluation["ordinary"].verdict) in words["ordinary"]
->>>>>>> page
     assert "its error is 7 times that of the others" in words["suspicious"]
     assert every_evaluation["single"].calibration.assumptions[0] in words["single"]
     for said in (

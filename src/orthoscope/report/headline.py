@@ -39,7 +39,6 @@ class Headline(NamedTuple):
 
 
 def headline(evaluation: Evaluation) -> Headline:
-<<<<<<< HEAD
     """What stands above all else; the grade's word is said once, in colour."""
     verdict = evaluation.verdict
     look, sign = LOOKS[verdict.grade]
@@ -49,14 +48,4 @@ def headline(evaluation: Evaluation) -> Headline:
 
 def next_steps(evaluation: Evaluation) -> list[str]:
     """What to do now: the verdict's advice; empty where the camera is as good as it gets."""
-=======
-    """The verdict as the page opens with it."""
-    verdict = evaluation.verdict
-    look, sign = LOOKS[verdict.grade]
-    return Headline(str(verdict.grade), look, sign, f"{verdict.far} {verdict.limit}".strip())
-
-
-def next_steps(evaluation: Evaluation) -> list[str]:
-    """What to do now, most urgent first: what the evaluation advises."""
->>>>>>> page
     return [evaluation.verdict.advice] if evaluation.verdict.advice else []

@@ -48,26 +48,7 @@ const faded = i => (state.off.has(i) ? 0.25 : state.picked == null || state.pick
 function byView() {
   const top = Math.max(...views.map(v => Math.max(v.rms || 0, v.heldOut || 0)), 1e-9) * 1.06;
   new Plot("by-view", {
-<<<<<<< HEAD
     ...alongViews(top, "rms (px per point)"),
-=======
-    range: () => ({ x: [-0.6, Math.max(views.length, 4) - 0.4], y: [top, 0] }),
-    labels: ["photograph", "rms (px per point)"],
-    gridY: true,
-    zoomsX: true,
-    margin: { l: 66, r: 14, t: 30, b: 42 },
-    height: () => 210,
-    ticksX: p => {
-      const [from, to] = p.shown.x,
-        room = p.box.w / (to - from),
-        names = room > 92,
-        told = [];
-      const by = names ? 1 : Math.max(1, Math.ceil(34 / room));
-      for (let i = Math.max(0, Math.ceil(from)); i <= to && i < views.length; i++)
-        if (i % by === 0) told.push({ at: i, text: names ? named(i) : `${i + 1}` });
-      return told;
-    },
->>>>>>> page
     paint: p => {
       const g = p.ctx,
         wide = Math.max(1, 0.72 * (p.X(1) - p.X(0)));
