@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from helpers.laws import FREE_LENSES_TO_TRY, for_every_lens
-from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
+from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty, Variances
 from orthoscope.formats.own.json import load, load_calibration, load_camera, load_detections, save
 from orthoscope.formats.own.json_layout import lay_out
 from orthoscope.geometry.arrays import InputError
@@ -77,10 +77,12 @@ def a_decoupled_calibration() -> Calibration:
         settings={"lens": "free", "target": "free", "base": "brown", "through": "free", "skew": False},
         target_shape=TargetShape("free", 1e-3 * generator.standard_normal((12, 3))),
         parameters=41.0 + 1 / 3,
+        uncertainty=Uncertainty(("fx", "k1"), np.array([[0.3, 0.0], [0.0, 1 / 7]]), np.eye(2) / 9),
+        variances=Variances(0.01, (1e-9, 2e-9), (1e-10, 2e-10, 1 / 3), 1e-8, 0.2, 1.5),
         candidates=(
             Candidate("flat", "brown", 0.3, 0.01, 0.2),
-            Candidate("smooth", "brown", 1 / 3, float("nan"), 1 / 7),
-            Candidate("free", "free", *[float("nan")] * 3),
+            Candidate("smooth", "brown", 1 / 3, float("nan"), 1 / 7, "brown", "joint", 3),
+            Candidate("free", "rational", *[float("nan")] * 3, "brown", "pairs", 0),
         ),
         free_camera=Camera((640, 480), CAMERA.intrinsics, FREE_LENSES_TO_TRY["free over kannala_brandt"]),
     )
@@ -154,6 +156,8 @@ def test_a_calibration_comes_back_to_the_last_bit(tmp_path, made):
         assert_array_equal(pose_a.translation, pose_b.translation)
     assert again.uncertainty.names == made.uncertainty.names
     assert_array_equal(again.uncertainty.covariance, made.uncertainty.covariance)
+    assert_array_equal(again.uncertainty.model, made.uncertainty.model)
+    assert again.variances == made.variances
     for name in ("method", "settings", "status", "steps", "version", "assumptions", "parameters"):
         assert getattr(again, name) == getattr(made, name), name
     assert again.target_shape.kind == made.target_shape.kind
@@ -184,8 +188,26 @@ def test_what_no_view_could_judge_is_null_in_the_file(tmp_path):
         parse_constant=lambda name: pytest.fail(f"{name} is no JSON"),
     )
     assert content["candidates"][1:] == [
-        ["smooth", "brown", 1 / 3, None, 1 / 7],
-        ["free", "free", None, None, None],
+        {
+            "target": "smooth",
+            "lens": "brown",
+            "base": "brown",
+            "fit": "joint",
+            "views": 3,
+            "held_out_px": 1 / 3,
+            "standard_error_px": None,
+            "loses_px": 1 / 7,
+        },
+        {
+            "target": "free",
+            "lens": "rational",
+            "base": "brown",
+            "fit": "pairs",
+            "views": 0,
+            "held_out_px": None,
+            "standard_error_px": None,
+            "loses_px": None,
+        },
     ]
 
 
@@ -405,8 +427,8 @@ DECOUPLED_FAULTS = {
         r"coefficients has shape \(98, 2\)",
     ),
     "a candidate without error": (
-        lambda content: content["candidates"][0].pop(),
-        r"of length 5 - at `\$.candidates\[0\]`",
+        lambda content: content["candidates"][0].pop("standard_error_px"),
+        r"missing required field `standard_error_px` - at `\$.candidates\[0\]`",
     ),
 }
 

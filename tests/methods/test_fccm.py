@@ -30,7 +30,7 @@ from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.methods.fccm import fccm
-from orthoscope.models.camera import Intrinsics
+from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import (
     LENSES,
@@ -438,3 +438,14 @@ def test_residuals_are_predicted_minus_detected():
         )
     assert_allclose(found.rms_px, np.sqrt((np.concatenate(found.residuals()) ** 2).sum(-1).mean()))
     assert K.skew == found.camera.intrinsics.skew == 0.0
+
+
+@pytest.mark.parametrize("away", [(880.0, 650.0), (-150.0, 250.0), (310.0, 760.0)])
+def test_a_principal_point_off_the_frame_is_found(away: tuple[float, float]):
+    true = Camera((640, 480), Intrinsics(700.0, 702.0, *away), Brown(k1=-0.1, k2=0.02))
+    detections = photographed(true, 12, noise_px=0.05, fill=(0.4, 0.7))
+    found = fccm(detections, lens="brown:k1,k2")
+    K, deviations = found.camera.intrinsics, found.uncertainty.deviations
+    assert abs(K.fx - 700.0) < 5.0 * deviations["fx"]
+    assert np.hypot(K.cx - away[0], K.cy - away[1]) < 5.0 * np.hypot(deviations["cx"], deviations["cy"])
+    assert found.rms_px < 0.1

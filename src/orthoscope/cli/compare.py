@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,8 @@ __all__ = ["compare"]
 
 EXAMPLE = """\b
 Example:
-  $ orthoscope compare photos/ --target chessboard:9x6:25mm --with decoupled --with decoupled:brown --with fccm:brown
-  views      14 used, 0 set aside; 756 corners; 5 folds held out
+  $ orthoscope compare photos/ --target chessboard:9x6:25mm --with decoupled --with decoupled:brown --with
+  fccm:brown views      14 used, 0 set aside; 756 corners; 5 folds held out
                    held out (px)     loses (px)    NCE  used (px)  parameters  seconds  lens   target
   decoupled        0.088 ± 0.015           best  0.180      0.067         162     3.30  free   free
   decoupled:brown  0.090 ± 0.013  0.002 ± 0.002  0.189      0.074         141     3.04  brown  free
@@ -28,8 +29,9 @@ Example:
   wrote      comparison/comparison.json, comparison/comparison.html, comparison/comparison.svg
 
 \b
-WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or decoupled:brown:target=flat.
-PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+comparison.svg, for print, is written where matplotlib is installed (pip install 'orthoscope[figures]').
+WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or
+decoupled:brown:target=flat. PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
 Exit: 0 done, 1 the photographs are too few to hold any out, 2 the command is wrong.
 """
 HEADINGS = ("", "held out (px)", "loses (px)", "NCE", "used (px)", "parameters", "seconds", "lens", "target")
@@ -93,8 +95,9 @@ def compare(
     texts = {
         "comparison.json": text_of(comparison),
         "comparison.html": comparison_page(comparison),
-        "comparison.svg": comparison_svg(comparison),
     }
+    if find_spec("matplotlib"):  # the figure for print, where what draws it is installed
+        texts["comparison.svg"] = comparison_svg(comparison)
     for name, text in texts.items():
         write_text(out / name, text)
     written = "wrote      " + ", ".join(str(out / name) for name in texts)

@@ -15,6 +15,7 @@ import re
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager
 from os import PathLike
 from pathlib import Path
 
@@ -28,10 +29,12 @@ from orthoscope.geometry.arrays import InputError, ndarray
 __all__ = [
     "MOST_MEGAPIXELS",
     "SUFFIXES",
+    "checked_whole",
     "names_of",
     "pages_in",
     "passed_over",
     "photographs",
+    "quiet",
     "read_image",
     "to_grey",
     "write_image",
@@ -172,14 +175,22 @@ def _content(path: Path, most_megapixels: float) -> bytes:
             f"{path} is no file but a folder, pipe or device; expected a photograph. Leave it out."
         )
     content = read_bytes(path)
-    if not content:
-        raise InputError(f"{path} is empty; expected a photograph. Copy it again or leave it out.")
     width, height = size_in_header(content) or (0, 0)
     if width * height > most_megapixels * 1e6:
         raise InputError(
             f"{path} says that it is {width}x{height}, {width * height / 1e6:.0f} megapixels; expected at"
             f" most {most_megapixels:g}. Raise --max-megapixels if it is a photograph."
         )
+    return checked_whole(content, path)
+
+
+def checked_whole(content: bytes, path: Path_) -> bytes:
+    """The bytes of a picture's file.
+
+    Raises InputError where there are none or they are cut off.
+    """
+    if not content:
+        raise InputError(f"{path} is empty; expected a photograph. Copy it again or leave it out.")
     if not _is_whole(content):
         raise InputError(
             f"{path} is cut off ({len(content)} bytes without an end); expected a whole photograph. Copy it"
@@ -317,3 +328,8 @@ class _Quiet:
 
 
 _QUIET = _Quiet()
+
+
+def quiet() -> AbstractContextManager[None]:
+    """A block in which OpenCV keeps its remarks to itself."""
+    return _QUIET

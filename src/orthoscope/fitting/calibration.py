@@ -20,19 +20,24 @@ from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 from orthoscope.targets.target import Target
 
-__all__ = ["Calibration", "Candidate", "Uncertainty", "points_of", "residuals_of", "rms"]
+__all__ = ["Calibration", "Candidate", "Uncertainty", "Variances", "points_of", "residuals_of", "rms"]
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
     """What the data leave open about the camera.
 
-    names: the parameters that were estimated, `fx`, `cx`, `k1`...; a parameter tied to another bears both
-    names, `fx=fy`. covariance: (k,k), in the parameters' own units, for residuals as large as those found.
+    Args:
+        names: the parameters that were estimated, `fx`, `cx`, `k1`...; a parameter tied to another bears both
+            names, `fx=fy`.
+        covariance: (k,k), in the parameters' own units.
+        model: (k,k), the part of it that independent errors of corners make, for residuals as large as those
+            found; the covariance itself where nothing is said.
     """
 
     names: tuple[str, ...]
     covariance: ndarray
+    model: ndarray = None  # type: ignore[assignment]  # made below
 
     def __post_init__(self) -> None:
         k = len(self.names)
@@ -40,6 +45,8 @@ class Uncertainty:
         object.__setattr__(
             self, "covariance", frozen(np.reshape(self.covariance, (k, k)), (k, k), "covariance")
         )
+        model = self.covariance if self.model is None else self.model
+        object.__setattr__(self, "model", frozen(np.reshape(model, (k, k)), (k, k), "covariance of model"))
 
     def __repr__(self) -> str:
         told = (f"{name} {deviation:.2g}" for name, deviation in self.deviations.items())
@@ -56,10 +63,39 @@ class Uncertainty:
         }
 
 
-class Candidate(NamedTuple):
-    """What a method tried: target shape and lens, held-out error with its standard error, pixels per point.
+class Variances(NamedTuple):
+    """How large a fit with priors found noise and displacements to be (methods/decoupled/evidence.py).
 
-    loses_px: its held-out error less that of the one that was taken.  NaN where no view could judge it.
+    Args:
+        noise: px^2 of a coordinate.
+        surface: metres^2, of the target's smooth displacement along its plane and across it.
+        singles: metres^2, of corners by themselves along each axis.
+        bend: of the lens's displacement, squared unit of its plane.
+        size: of the target, metres.
+        likeness: of errors within a view, 1 or more.
+    """
+
+    noise: float
+    surface: tuple[float, float]
+    singles: tuple[float, float, float]
+    bend: float
+    size: float
+    likeness: float
+
+
+class Candidate(NamedTuple):
+    """What a method tried, and how well it foresees photographs that it has not seen.
+
+    Args:
+        target: the kind of the target's shape.
+        lens: a formula, or `free`.
+        held_out_px: rms over all corners, each view foreseen by the others, pixels per point; NaN where no
+            view could judge it.
+        standard_error_px: of it, views taken as independent draws.
+        loses_px: its held-out error less that of the one that was taken.
+        base: the formula under a free lens, or the formula itself.
+        fit: `joint`, or `pairs` where the formula was fitted to the pairs of step 1.
+        views: how many views could judge it.
     """
 
     target: str
@@ -67,6 +103,9 @@ class Candidate(NamedTuple):
     held_out_px: float
     standard_error_px: float
     loses_px: float
+    base: str = ""
+    fit: str = "joint"
+    views: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +117,9 @@ class Calibration:
     assumptions: what was taken for granted because the data could not tell, each a sentence. target_shape:
     where the target's corners were found to be; flat where nothing is said. parameters: how many of camera
     and shape the data determined, a real number where priors shared in it. candidates: what else was tried,
-    simplest first. free_camera: with the lens that no formula limits, where the camera's is a formula. Raises
-    InputError where poses and views, or the shape and the target, do not match in number.
+    simplest first. free_camera: with the lens that no formula limits, where the camera's is a formula.
+    variances: that a fit with priors found and ended with. Raises InputError where poses and views, or the
+    shape and the target, do not match in number.
     """
 
     camera: Camera
@@ -92,10 +132,12 @@ class Calibration:
     steps: int
     version: str
     assumptions: tuple[str, ...] = ()
-    target_shape: TargetShape = None  # type: ignore[assignment]  # flat, made below for as many corners as there are
+    # type: ignore[assignment]  # flat, made below for as many corners as there are
+    target_shape: TargetShape = None  # type: ignore[assignment]
     parameters: float = float("nan")  # the uncertainty's, where nothing is said
     candidates: tuple[Candidate, ...] = ()
     free_camera: Camera | None = None
+    variances: Variances | None = None
 
     def __post_init__(self) -> None:
         corners = len(self.detections.target.points)

@@ -23,7 +23,7 @@ from orthoscope.targets.detections import Detections
 __all__ = ["check_enough", "check_known", "told"]
 
 NOISE = 0.1  # px: corners are never taken to be better than this when asking what the views can tell
-VAGUE = 0.05  # a scale less certain than this share of itself is not known
+VAGUE = 0.1  # a scale less certain than this share of itself is not known
 PARALLEL = np.deg2rad(10.0)  # targets that are turned against the first by less than this count as parallel
 
 

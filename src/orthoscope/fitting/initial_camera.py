@@ -35,7 +35,7 @@ from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Cauchy
 
-__all__ = ["Assumptions", "StartingCameras", "starts", "suited_lens"]
+__all__ = ["Assumptions", "StartingCameras", "starts", "starts_elsewhere", "suited_lens"]
 
 FIELDS = np.deg2rad(
     [6, 12, 20, 30, 40, 60, 80, 100, 120, 140, 160, 180, 200, 220, 250]
@@ -46,6 +46,11 @@ SAMPLE = 48  # views that tell whether a base fits, and refine it
 GOOD = 0.01
 WIDE = np.deg2rad(60.0)  # corners farther from the axis than this ask for a lens of the angle
 STEEP = np.deg2rad(88.0)  # rays farther out than this no lens of the plane is fitted to
+# the principal point's places, from the frame's middle in its sides, where a start off the frame is looked
+# for
+AROUND = [(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if x or y]
+AWAY = 3.0  # of the frame's sides: farther off it no principal point is looked for
+MORE = 3  # starts off the frame that are tried
 ALIKE: dict[
     type[Formula], tuple[dict[str, float], ...]
 ] = {  # coefficients of no distortion, in different valleys of the cost
@@ -104,20 +109,52 @@ class StartingCameras:
         """Zhang's closed form as a camera without distortion; where the full form fails, with the principal
         point at the centre.
         """
-        basis, observations = self.narrowing.basis, self.observations
-        plane = self.points[observations.ids, :2]
-        homographies = homographies_to_pixels(plane, observations.pixels(), observations.present)
+        basis = self.narrowing.basis
         for allowed in (
             basis,
             *(narrower for narrower in (NO_SKEW, CENTRED_SQUARE) if len(narrower) < len(basis)),
         ):
-            K = intrinsics_of_homographies(homographies, self.image_size, allowed)
+            K = intrinsics_of_homographies(self._homographies, self.image_size, allowed)
             if K is not None and _plausible(K, self.image_size):
-                camera = Camera(self.image_size, self.narrowing.of_camera(K), Brown())
-                return Estimate(
-                    camera, poses_of_homographies(np.linalg.solve(camera.intrinsics.matrix, homographies))
-                )
+                return self._pinhole_with(K)
         return None
+
+    @cached_property
+    def closed_form_is_off_the_frame(self) -> bool:
+        """Whether Zhang's closed form puts the principal point beyond the frame, a camera else."""
+        K = intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)
+        return K is not None and _plausible(K, self.image_size, AWAY) and not _plausible(K, self.image_size)
+
+    @cached_property
+    def elsewhere(self) -> list[Estimate]:
+        """Pin-holes whose principal point is off the frame's middle, likelier first: Zhang's closed form
+        wherever it puts the point, and with the point held in places around the frame. Crops, lenses that
+        shift and projectors have it there.
+        """
+        if "cx" not in self.narrowing.free:
+            return []
+        found = [intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)]
+        width, height = self.image_size
+        for x, y in AROUND:
+            away = np.array([[1.0, 0.0, -x * width], [0.0, 1.0, -y * height], [0.0, 0.0, 1.0]])
+            K = intrinsics_of_homographies(away @ self._homographies, self.image_size, CENTRED_SQUARE)
+            found.append(K and replace(K, cx=K.cx + x * width, cy=K.cy + y * height))
+        starts = [
+            self._pinhole_with(K) for K in found if K is not None and _plausible(K, self.image_size, AWAY)
+        ]
+        return sorted(starts, key=self.misfit)[:MORE]
+
+    @cached_property
+    def _homographies(self) -> Float[ndarray, "m 3 3"]:
+        observations = self.observations
+        plane = self.points[observations.ids, :2]
+        return homographies_to_pixels(plane, observations.pixels(), observations.present)
+
+    def _pinhole_with(self, K: Intrinsics) -> Estimate:
+        camera = Camera(self.image_size, self.narrowing.of_camera(K), Brown())
+        return Estimate(
+            camera, poses_of_homographies(np.linalg.solve(camera.intrinsics.matrix, self._homographies))
+        )
 
     @cached_property
     def pinhole_fits(self) -> bool:
@@ -200,6 +237,21 @@ def starts(
     return found
 
 
+def starts_elsewhere(
+    bases: StartingCameras, lens: type[Formula], coefficients: Sequence[str]
+) -> list[Estimate]:
+    """More starts, the principal point off the frame's middle, for when those of `starts` led nowhere
+    good.
+    """
+    found: list[Estimate] = []
+    for base in bases.elsewhere:
+        try:
+            found += _with_lens(bases, base, lens, coefficients)[:1]
+        except CalibrationError:
+            continue
+    return found
+
+
 def suited_lens(bases: StartingCameras) -> str:
     """The lens for someone who named none: `brown`, or `kannala_brandt` where corners lie more than WIDE from
     the axis.
@@ -210,16 +262,16 @@ def suited_lens(bases: StartingCameras) -> str:
     return "kannala_brandt" if rays[:, 2].min(initial=1.0) < np.cos(WIDE) else "brown"
 
 
-def _plausible(K: Intrinsics, image_size: tuple[int, int]) -> bool:
+def _plausible(K: Intrinsics, image_size: tuple[int, int], away: float = 0.0) -> bool:
     """Whether K could belong to a camera that takes such images: its shape within 2, its principal point
-    within the frame.
+    within the frame, or so many times the frame's sides away from it.
     """
     longer = max(image_size)
     return (
         0.1 * longer < K.fx < 100 * longer
         and 0.5 < K.fx / K.fy < 2.0
-        and 0 < K.cx < image_size[0]
-        and 0 < K.cy < image_size[1]
+        and -away * image_size[0] < K.cx < (1.0 + away) * image_size[0]
+        and -away * image_size[1] < K.cy < (1.0 + away) * image_size[1]
     )
 
 

@@ -15,20 +15,28 @@ from dataclasses import replace
 
 import numpy as np
 
+from orthoscope.fitting.board_order import in_one_order
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.identifiability import check_enough, check_known, told
-from orthoscope.fitting.initial_camera import Assumptions, StartingCameras, starts, suited_lens
+from orthoscope.fitting.initial_camera import (
+    Assumptions,
+    StartingCameras,
+    starts,
+    starts_elsewhere,
+    suited_lens,
+)
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.models.lenses import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
 from orthoscope.solve.losses import LOSSES, Loss
 from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__
 
-__all__ = ["fccm"]
+__all__ = ["fccm", "fit_flat"]
 
 AUTO = "auto"
 # share of the cost; of a million numbers that is 1e-4 of one's variance: nothing known moves by 1 % of its
@@ -43,8 +51,10 @@ FIRM = 5
 ADEQUATE = 0.003
 LONG_WALK = 25  # steps; so many speak of a flat valley, and where corners are FEW there are often others
 FEW = 2000  # corners
+SQUARE = 1.1  # times longer than wide: cameras have no pixels that are less square
 
 
+@with_one_thread
 def fccm(
     detections: Detections,
     *,
@@ -62,6 +72,30 @@ def fccm(
     starts to matter, pixels. progress: called after each step with (step, cost). Raises CalibrationError
     where the views cannot tell the camera, InputError for a setting that is none.
     """
+    return in_one_order(
+        fit_flat(
+            detections,
+            lens=lens,
+            skew=skew,
+            loss=loss,
+            loss_scale=loss_scale,
+            max_steps=max_steps,
+            progress=progress,
+        )
+    )
+
+
+def fit_flat(
+    detections: Detections,
+    *,
+    lens: str = AUTO,
+    skew: bool = False,
+    loss: str = "linear",
+    loss_scale: float = 1.0,
+    max_steps: int = 200,
+    progress: Callable[[int, float], None] | None = None,
+) -> Calibration:
+    """`fccm` with the corners of every view listed as they came; settings as there."""
     if loss not in LOSSES:
         raise InputError(f"loss {loss!r} is not known; expected one of {', '.join(LOSSES)}.")
     used = with_usable_views(detections)
@@ -81,6 +115,11 @@ def fccm(
     if sample is not observations:
         estimates = [_nearer(estimate, bases, free, cost) for estimate in estimates]
     solution = _best(estimates, observations, used, free, cost, options)
+    if len(used.views) > 2 and _is_doubtful(solution, bases):
+        more = [
+            _nearer(estimate, bases, free, cost) for estimate in starts_elsewhere(bases, kind, coefficients)
+        ]
+        solution = _best(more, observations, used, free, cost, options, best=solution)
     covariance = shared_covariance(solution.sums, 2 * used.corners)
     check_known(solution, free, covariance, used)
     uncertainty, left_open = told(free, covariance)
@@ -106,6 +145,15 @@ def _nearer(start: Estimate, bases: StartingCameras, free: tuple[str, ...], loss
     ).unknowns
 
 
+def _is_doubtful(solution: Solution[Estimate], bases: StartingCameras) -> bool:
+    """Whether there may be a better minimum elsewhere: pixels far from square, a principal point off the
+    frame, or one that Zhang's closed form would put there.
+    """
+    K, (width, height) = solution.unknowns.camera.intrinsics, bases.image_size
+    inside = 0.0 < K.cx < width and 0.0 < K.cy < height
+    return not inside or not 1.0 / SQUARE < K.fx / K.fy < SQUARE or bases.closed_form_is_off_the_frame
+
+
 def _best(
     estimates: list[Estimate],
     observations: Observations,
@@ -113,11 +161,13 @@ def _best(
     free: tuple[str, ...],
     loss: Loss,
     options: Options,
+    *,
+    best: Solution[Estimate] | None = None,
 ) -> Solution[Estimate]:
     """The joint refinement from the first start that ends well and without a long walk, or else the best of
-    all.
+    all; and of all of them, where one is known.
     """
-    best: Solution[Estimate] | None = None
+    known = best
     enough = used.corners * float(loss.cost(np.array((ADEQUATE * np.hypot(*used.image_size)) ** 2)))
     for estimate in estimates:
         problem = Reprojection(observations, used.target.points, estimate.camera, free)
@@ -130,7 +180,8 @@ def _best(
             solution = replace(scaled, steps=solution.steps + scaled.steps)
         if solution.status is not Status.NO_COST and (best is None or solution.cost < best.cost):
             best = solution
-        if best is not None and best.cost < enough and (solution.steps < LONG_WALK or used.corners > FEW):
+        ends_well = best is not None and best.cost < enough
+        if ends_well and known is None and (solution.steps < LONG_WALK or used.corners > FEW):
             break
     if best is None:
         raise CalibrationError(_no_start(estimates[0], observations, used))

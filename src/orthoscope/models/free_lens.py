@@ -18,7 +18,7 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.models.charts import Chart
 from orthoscope.models.lens import Lens
-from orthoscope.models.newton_inverse import Warp, invert
+from orthoscope.models.newton_inverse import Bent, Warp, invert
 from orthoscope.models.spline import Displacement
 
 __all__ = ["FreeLens"]
@@ -92,6 +92,7 @@ class FreeLens(Lens):
             yx * at.j_xx + yy * at.j_yx,
             yx * at.j_xy + yy * at.j_yy,
             [(xx * b_x + xy * b_y, yx * b_x + yy * b_y) for b_x, b_y in at.by],
+            Bent(at.x, at.y, by_x[..., 0], by_y[..., 0], by_x[..., 1], by_y[..., 1]),
         )
 
     def unwarp(self, x_d: ndarray, y_d: ndarray) -> tuple[ndarray, ndarray]:

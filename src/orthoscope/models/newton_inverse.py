@@ -23,7 +23,7 @@ import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
 
-__all__ = ["Warp", "determinant", "invert"]
+__all__ = ["Bent", "Warp", "determinant", "invert"]
 
 LEFT = 1e-13  # what two chords may leave, and places that they leave more of go on to Newton
 CLOSE = 1e-6  # after chords that have come down to this Newton goes on where they ended
@@ -31,9 +31,24 @@ NEAR = 1e-9  # a Newton step shorter than this leaves an error below 1e-16, sinc
 STEPS, PATIENCE = 12, 200
 
 
+class Bent(NamedTuple):
+    """Places of a plane before a displacement bent it, and the slopes of the displacement there: s_xy is d
+    s_x / d y.
+    """
+
+    x: ndarray
+    y: ndarray
+    s_xx: ndarray
+    s_xy: ndarray
+    s_yx: ndarray
+    s_yy: ndarray
+
+
 class Warp(NamedTuple):
     """A distorted place with its derivatives: j_xy is d x_d / d y; by[i] is d(x_d, y_d) by the i-th
     coefficient asked for.
+
+    bent: of a lens that displaces the plane of another; None of a formula.
     """
 
     x: ndarray
@@ -43,6 +58,7 @@ class Warp(NamedTuple):
     j_yx: ndarray
     j_yy: ndarray
     by: list[tuple[ndarray, ndarray]]
+    bent: Bent | None = None
 
 
 Place = tuple[ndarray, ndarray]

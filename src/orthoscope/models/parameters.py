@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, ndarray
+from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.spline import Displacement
 
 if TYPE_CHECKING:
     from orthoscope.models.camera import Camera, Intrinsics
@@ -126,10 +128,12 @@ class Parameters:
         if steps:
             values = dict(zip(lens.names(), lens.coefficients.tolist(), strict=True))
             lens = lens.with_coefficients(**{name: values[name] + length for name, length in steps.items()})
-        frame = camera.lens_frame
+        frame, K = camera.lens_frame, _moved(camera.intrinsics, own)
+        if isinstance(lens, FreeLens) and frame is None:
+            lens = _kept_in_place(lens, camera.intrinsics, K)
         return replace(
             camera,
-            intrinsics=_moved(camera.intrinsics, own),
+            intrinsics=K,
             lens=lens,
             lens_frame=_moved(frame, of_frame) if frame else None,
         )
@@ -162,3 +166,14 @@ def _moved(K: Intrinsics, steps: dict[str, float]) -> Intrinsics:
         if name in values and not values[name] > 0:
             values[name] = 0.5 * getattr(K, name)
     return replace(K, **values) if values else K
+
+
+def _kept_in_place(lens: FreeLens, before: Intrinsics, after: Intrinsics) -> FreeLens:
+    """The lens with its displacement's lattice where it was in the image.
+
+    A lattice that went with K's principal point would have to be learnt anew wherever K goes, and would seem
+    to say where it is.
+    """
+    scale = np.array([before.fx / after.fx, before.fy / after.fy])
+    shift = np.array([(before.cx - after.cx) / after.fx, (before.cy - after.cy) / after.fy])
+    return replace(lens, over=Displacement(lens.over.lattice.seen_from(scale, shift), lens.over.coefficients))

@@ -18,6 +18,7 @@ import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.charts import Covector
+from orthoscope.models.newton_inverse import Bent
 from orthoscope.models.parameters import FRAME, Parameters
 
 if TYPE_CHECKING:
@@ -97,8 +98,23 @@ class PixelSlopes:
             parts = [self._by_frame(entry) for entry in FRAME[name]]
             return sum(u for u, _ in parts), sum(v for _, v in parts)
         if self._turn is None:
-            return self._by_entry(name)
+            u, v = self._by_entry(name)
+            if self._at.bent is None:
+                return u, v
+            carried_u, carried_v = self._carried(name, self._at.bent)
+            return u + carried_u, v + carried_v
         return self._by_turn(name, self._point)
+
+    def _carried(self, entry: str, bent: Bent) -> tuple[ndarray, ndarray]:
+        """By an entry of K through a displacement alone: it stands in the image, K moves the plane below.
+
+        Skew moves nothing there: a lattice is shifted and stretched with the image, not sheared.
+        """
+        L, (row, column) = self._frame, ENTRIES[entry]
+        moved = 0.0 if entry == "skew" else (bent.x, bent.y, 1.0)[column]
+        x, y = (moved / L.fx, 0.0) if row == 0 else (0.0, moved / L.fy)
+        s_x, s_y = bent.s_xx * x + bent.s_xy * y, bent.s_yx * x + bent.s_yy * y
+        return L.fx * s_x + L.skew * s_y, L.fy * s_y
 
     def _by_frame(self, entry: str) -> tuple[ndarray, ndarray]:
         """By an entry of a frame of the lens's own."""

@@ -60,6 +60,10 @@ class Lattice:
         low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         return cls(low, (high - low) / cells, (cells[0] + ACROSS - 1, cells[1] + ACROSS - 1))
 
+    def seen_from(self, scale: Float[ndarray, " 2"], shift: Float[ndarray, " 2"]) -> Lattice:
+        """The same lattice where places of the plane are written scale * place + shift."""
+        return Lattice(scale * self.origin + shift, scale * self.step, self.shape)
+
     @property
     def splines(self) -> int:
         """How many there are."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -27,11 +28,12 @@ from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, InputError
-from orthoscope.methods.decoupled.decoupled import decoupled
+from orthoscope.methods.decoupled.decoupled import BASES, decoupled
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import Brown, Division
+from orthoscope.models.target_shape import SHAPES as KINDS
 from orthoscope.models.target_shape import without_similarity
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections
@@ -94,13 +96,17 @@ def test_with_noise_camera_and_target_are_found_as_well_as_the_noise_lets_them(
 
 
 def test_candidates_are_told_with_what_each_loses_against_the_one_that_was_taken(found: Calibration):
-    assert [candidate.target for candidate in found.candidates[:3]] == ["flat", "smooth", "free"]
-    assert [candidate.lens for candidate in found.candidates] == ["brown", "brown", "brown", "free"]
+    assert {candidate.base for candidate in found.candidates[: len(BASES)]} == set(BASES)
+    tried = {
+        (candidate.target, candidate.lens) for candidate in found.candidates if candidate.base == "brown"
+    }
+    assert tried == set(product(KINDS, ("brown", "free")))
+    assert all(candidate.views == len(found.detections.views) for candidate in found.candidates)
     taken = next(candidate for candidate in found.candidates if candidate.loses_px == 0.0)
     assert (taken.target, taken.lens) == (found.settings["target"], found.settings["lens"])
     for candidate in found.candidates:
         assert candidate.loses_px == pytest.approx(candidate.held_out_px - taken.held_out_px)
-    flat = found.candidates[0]
+    flat = next(candidate for candidate in found.candidates if candidate[:2] == ("flat", "brown"))
     assert flat.loses_px > 5.0 * flat.standard_error_px
 
 
@@ -117,7 +123,7 @@ def test_a_perfect_board_and_a_lens_that_its_formula_describes_are_not_harmed(ca
     seen = np.concatenate([view.pixels for view in detections.views])
     ours, peers = (
         np.sqrt((image_difference(camera, made.camera, seen) ** 2).mean())
-        for made in (decoupled(detections, folds=3), fccm(detections))
+        for made in (decoupled(detections), fccm(detections))
     )
     assert (
         ours < 1.2 * peers
@@ -147,6 +153,7 @@ def test_its_settings_are_plain_and_called_again_give_the_same_to_the_last_bit(
         "target": "free",
         "base": "brown",
         "through": "formula",
+        "fit": "joint",
         "skew": False,
     }
     again = decoupled(noisy, **found.settings)
@@ -170,7 +177,7 @@ def test_whatever_is_settled_beforehand_is_kept_and_gives_the_same_again(noisy: 
 
 @pytest.mark.slow
 def test_the_same_photographs_give_the_same_choice_to_the_last_bit(noisy: Detections):
-    one, other = (decoupled(noisy.only(range(6)), folds=2) for _ in range(2))
+    one, other = (decoupled(noisy.only(range(6))) for _ in range(2))
     assert_same(one, other)
     assert one.candidates == other.candidates
 
@@ -191,11 +198,13 @@ def test_a_formula_that_is_asked_for_comes_with_the_free_camera_that_it_was_fitt
 def test_out_of_several_formulas_the_one_that_foresees_best_is_taken(noisy: Detections):
     chosen = decoupled(noisy, target="free", through="formula", among=("rational", "division:l", "brown"))
     assert chosen.settings["lens"] == "brown"  # simpler ones do not suffice, richer ones gain nothing
-    assert [candidate.lens.split()[0] for candidate in chosen.candidates[-3:]] == [
-        "division:l",
-        "brown",
-        "rational",
-    ]
+    assert {(candidate.lens, candidate.fit) for candidate in chosen.candidates[-5:]} == {
+        ("division:l", "pairs"),
+        ("division:l", "joint"),
+        ("brown", "joint"),
+        ("rational", "pairs"),
+        ("rational", "joint"),
+    }
     only = decoupled(noisy, target="free", through="formula", among=("division",))
     assert isinstance(only.camera.lens, Division)
 
@@ -206,10 +215,11 @@ def test_progress_counts_to_the_end(noisy: Detections):
         noisy,
         lens="brown",
         through="formula",
-        folds=2,
         judging=lambda done, to_do: heard.append((done, to_do)),
     )
-    assert heard == [(i, 6) for i in range(1, 7)]  # three shapes of two folds
+    assert [done for done, _ in heard] == sorted(done for done, _ in heard)
+    assert heard[-1][0] == heard[-1][1]
+    assert len(heard) > len(BASES)
 
 
 def test_a_skew_is_found_where_it_is_asked_for():
@@ -221,7 +231,7 @@ def test_a_skew_is_found_where_it_is_asked_for():
 
 def test_partial_boards_are_as_welcome_as_whole_ones():
     detections = some_corners(photographed_with(bowed(2e-3), NARROW, 10, noise_px=NOISE), (0.5, 0.9))
-    found = decoupled(detections, through="formula", folds=3)
+    found = decoupled(detections, through="formula")
     assert found.settings["target"] in ("smooth", "free")
     assert worst_image(NARROW, found.camera, detections) < 0.1 * worst_image(
         NARROW, fccm(detections).camera, detections
@@ -241,7 +251,7 @@ def test_a_board_of_few_corners_is_calibrated_too():
     detections = photographed_with(
         stretched(0.01, target), NARROW, 12, target=target, noise_px=NOISE, fill=(0.5, 0.9)
     )
-    found = decoupled(detections, through="formula", folds=3)
+    found = decoupled(detections, through="formula")
     assert found.settings["target"] != "flat"
     assert found.rms_px < 2.0 * NOISE
 
@@ -255,6 +265,7 @@ def test_with_few_views_the_target_is_taken_as_flat_and_that_is_said(views: int)
         "target": "flat",
         "base": "brown",
         "through": "formula",
+        "fit": "joint",
         "skew": False,
     }
     assert any(
@@ -297,7 +308,8 @@ def test_views_that_cannot_tell_the_camera_are_refused_as_by_fccm():
         ({"through": "windows"}, "through is 'windows'; expected 'free'"),
         ({"lens": "free", "through": "formula"}, "expected one of the two"),
         ({"among": ("brown", "soap")}, "lens 'soap' is not known"),
-        ({"folds": 1}, "folds is 1; expected at least 2"),
+        ({"fit": "by eye"}, "fit is 'by eye'; expected 'joint'"),
+        ({"lens": "brown", "fit": "joint", "through": "free"}, "cannot be fitted joint through free"),
     ],
 )
 def test_a_setting_that_is_none_is_refused(noisy: Detections, settings: dict, message: str):

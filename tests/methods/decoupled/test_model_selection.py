@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from orthoscope.methods.decoupled.model_selection import (
     Contender,
+    first_as_good,
     judged,
     richest_unless_worse,
     simplest_as_good,
@@ -24,16 +25,18 @@ for_either_rule = pytest.mark.parametrize("rule", [simplest_as_good, richest_unl
 def contenders(*squares: np.ndarray | float) -> list[Contender]:
     """With these sums of squares, of all views or of each."""
     return [
-        Contender("flat", f"lens {i}", np.broadcast_to(np.asarray(of_views, dtype=float), VIEWS))
+        Contender(
+            "brown", "flat", f"lens {i}", "joint", np.broadcast_to(np.asarray(of_views, dtype=float), VIEWS)
+        )
         for i, of_views in enumerate(squares)
     ]
 
 
 def losing(standard_errors: float) -> np.ndarray:
-    """Squares that lose so many standard errors against squares of 10 in each view."""
+    """Squares that lose so many standard errors against squares of 10 in each view, by their logarithms."""
     scatter = np.random.default_rng(0).standard_normal(VIEWS)
     scatter = (scatter - scatter.mean()) / scatter.std(ddof=1)
-    return 10.0 + standard_errors / np.sqrt(VIEWS) + scatter
+    return 10.0 * np.exp(0.1 * (standard_errors / np.sqrt(VIEWS) + scatter))
 
 
 def test_the_simplest_within_one_standard_error_of_the_best_is_taken():
@@ -54,8 +57,16 @@ def test_scatter_that_all_share_does_not_count(rule):
     hard = np.random.default_rng(1).gamma(
         0.5, 100.0, VIEWS
     )  # views differ by far more than the candidates do
-    assert rule(contenders(hard + losing(5.0), hard + 10.0), CORNERS) == 1
-    assert rule(contenders(hard + 10.0, hard + losing(5.0)), CORNERS) == 0
+    assert rule(contenders(hard * losing(5.0), hard * 10.0), CORNERS) == 1
+    assert rule(contenders(hard * 10.0, hard * losing(5.0)), CORNERS) == 0
+
+
+@for_either_rule
+def test_one_view_alone_does_not_decide(rule):
+    spoilt, better = np.full(VIEWS, 9.0) * np.linspace(0.95, 1.05, VIEWS), np.full(VIEWS, 10.0)
+    spoilt[3] = 2000.0  # in the mean square twelve times as much as all others together
+    assert rule(contenders(better, spoilt), CORNERS) == (1 if rule is richest_unless_worse else 0)
+    assert first_as_good(contenders(spoilt, better), CORNERS) == 0
 
 
 @for_either_rule
@@ -66,11 +77,19 @@ def test_views_count_by_their_corners(rule):
 
 
 @for_either_rule
-def test_one_that_some_view_could_not_be_judged_with_takes_no_part(rule):
+def test_one_that_fewer_views_could_judge_takes_no_part(rule):
     missing = np.full(VIEWS, 0.1)
     missing[3] = np.nan
     assert rule(contenders(missing, 10.0), CORNERS) == 1
     assert rule(contenders(10.0, missing), CORNERS) == 0
+
+
+@for_either_rule
+def test_where_no_contender_can_be_judged_by_a_view_the_others_decide(rule):
+    worse, better = losing(5.0), np.full(VIEWS, 10.0)
+    worse[3] = better[3] = np.nan
+    assert rule(contenders(worse, better), CORNERS) == 1
+    assert rule(contenders(better, worse), CORNERS) == 0
 
 
 @for_either_rule
@@ -101,7 +120,7 @@ def test_what_is_told_is_the_error_per_point_and_how_much_it_loses():
     assert other.loses_px == 0.0
     assert one.loses_px == pytest.approx(one.held_out_px - other.held_out_px)
     assert one.loses_px > 0.0
-    # of 20 views the mean square of each scatters by 1 about 10: its root by 1 / (2 sqrt(10)), their mean by
-    # the root of 20 less
-    assert one.standard_error_px == pytest.approx(1.0 / (2.0 * one.held_out_px * np.sqrt(VIEWS)), rel=1e-9)
+    assert (one.views, none.views) == (VIEWS, 0)
+    assert other.standard_error_px == 0.0
+    assert one.standard_error_px > 0.0
     assert np.isnan([none.held_out_px, none.standard_error_px, none.loses_px]).all()

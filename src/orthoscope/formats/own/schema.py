@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
+from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty, Variances
 from orthoscope.formats.own.struct import FileStruct
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.pose import Pose
@@ -202,19 +202,23 @@ class PoseFile(FileStruct):
 class UncertaintyFile(FileStruct):
     names: list[str]
     covariance: list[Row]
+    model: list[Row] | None = None
 
     @classmethod
     def of(cls, uncertainty: Uncertainty) -> UncertaintyFile:
-        return cls(list(uncertainty.names), uncertainty.covariance.tolist())
+        differs = bool((uncertainty.model != uncertainty.covariance).any())
+        model = uncertainty.model.tolist() if differs else None
+        return cls(list(uncertainty.names), uncertainty.covariance.tolist(), model)
 
     def core(self) -> Uncertainty:
         k = len(self.names)
-        if len(self.covariance) != k or any(len(row) != k for row in self.covariance):
-            raise InputError(
-                f"the covariance is not {k} by {k} though {k} parameters are named; expected a row and a"
-                " column for each."
-            )
-        return Uncertainty(tuple(self.names), _array(self.covariance))
+        for matrix in (self.covariance, self.model or self.covariance):
+            if len(matrix) != k or any(len(row) != k for row in matrix):
+                raise InputError(
+                    f"the covariance is not {k} by {k} though {k} parameters are named; expected a row and a"
+                    " column for each."
+                )
+        return Uncertainty(tuple(self.names), _array(self.covariance), _array(self.model or self.covariance))
 
 
 class TargetShapeFile(FileStruct):
@@ -229,6 +233,44 @@ class TargetShapeFile(FileStruct):
         return TargetShape(self.kind, _array(self.displacements).reshape(-1, 3))
 
 
+class CandidateFile(FileStruct):
+    """JSON has no NaN: null says that nothing could judge."""
+
+    target: str
+    lens: str
+    base: str
+    fit: str
+    views: int
+    held_out_px: float | None
+    standard_error_px: float | None
+    loses_px: float | None
+
+    @classmethod
+    def of(cls, candidate: Candidate) -> CandidateFile:
+        told = (candidate.held_out_px, candidate.standard_error_px, candidate.loses_px)
+        figures = (value if np.isfinite(value) else None for value in told)
+        return cls(candidate.target, candidate.lens, candidate.base, candidate.fit, candidate.views, *figures)
+
+    def core(self) -> Candidate:
+        held_out, error, loses = (
+            float("nan") if value is None else value
+            for value in (self.held_out_px, self.standard_error_px, self.loses_px)
+        )
+        return Candidate(self.target, self.lens, held_out, error, loses, self.base, self.fit, self.views)
+
+
+class VariancesFile(FileStruct):
+    noise: float
+    surface: tuple[float, float]
+    singles: tuple[float, float, float]
+    bend: float
+    size: float
+    likeness: float
+
+    def core(self) -> Variances:
+        return Variances(self.noise, self.surface, self.singles, self.bend, self.size, self.likeness)
+
+
 class CalibrationFile(FileStruct, kw_only=True):
     version: str
     camera: CameraFile
@@ -239,7 +281,8 @@ class CalibrationFile(FileStruct, kw_only=True):
     settings: dict[str, Any]
     assumptions: list[str] = []
     parameters: float | None = None
-    candidates: list[tuple[str, str, float | None, float | None, float | None]] = []
+    candidates: list[CandidateFile] = []
+    variances: VariancesFile | None = None
     free_camera: CameraFile | None = None
     camera_from_target: list[PoseFile]
     target_shape: TargetShapeFile | None = None
@@ -259,7 +302,8 @@ class CalibrationFile(FileStruct, kw_only=True):
             detections=DetectionsFile.of(calibration.detections),
             assumptions=list(calibration.assumptions),
             parameters=calibration.parameters,
-            candidates=[_told(candidate) for candidate in calibration.candidates],
+            candidates=[CandidateFile.of(candidate) for candidate in calibration.candidates],
+            variances=calibration.variances and VariancesFile(*calibration.variances),
             free_camera=calibration.free_camera and CameraFile.of(calibration.free_camera),
             target_shape=(
                 None
@@ -281,7 +325,8 @@ class CalibrationFile(FileStruct, kw_only=True):
             version=self.version,
             assumptions=tuple(self.assumptions),
             parameters=float("nan") if self.parameters is None else self.parameters,
-            candidates=tuple(_candidate(row) for row in self.candidates),
+            candidates=tuple(candidate.core() for candidate in self.candidates),
+            variances=self.variances and self.variances.core(),
             free_camera=self.free_camera and self.free_camera.core(),
             **({"target_shape": self.target_shape.core()} if self.target_shape else {}),
         )
@@ -304,16 +349,6 @@ class SceneFile(FileStruct):
         return Scene(
             self.camera.core(), self.target.core(), tuple(pose.core() for pose in self.camera_from_target)
         )
-
-
-def _told(candidate: Candidate) -> tuple[str, str, float | None, float | None, float | None]:
-    """JSON has no NaN: null says that nothing could judge."""
-    held_out, error, loses = (value if np.isfinite(value) else None for value in candidate[2:])
-    return candidate.target, candidate.lens, held_out, error, loses
-
-
-def _candidate(row: tuple[str, str, float | None, float | None, float | None]) -> Candidate:
-    return Candidate(row[0], row[1], *(float("nan") if value is None else value for value in row[2:]))
 
 
 def _array(rows: Any) -> ndarray:

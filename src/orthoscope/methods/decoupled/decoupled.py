@@ -3,34 +3,39 @@
 The paper corrects detected corners by what perspective alone demands and fits any lens formula to (distorted,
 corrected) pairs; its eq. (7) leaves the camera open, since nothing ties the views together. What ties them is
 that one lens and one target made them all:
-0. corners and views that do not belong are named and left out (outliers.py);
+0. corners and views that do not belong are named and left out (outliers.py), boards that look alike both ways
+   up are listed one way (fitting/board_order.py);
 1. poses, the target's shape and a lens that no formula limits, together, their weights found (step_one.py,
    evidence.py);
-2. a lens formula, or the free lens itself, from the pairs of step 1 (step_two.py). Which target shape, which
-   lens: the simplest that is as good as the best on photographs that were not used (fold_fits.py,
-   model_selection.py). The figures behind each choice: docs/decoupled.md.
+2. a lens formula, or the free lens itself, from the pairs of step 1 (step_two.py), or jointly.
+Which base formula, which target shape, which lens, how it is fitted: by what views foresee that were left out
+(candidates.py, model_selection.py). The figures behind each choice: docs/decoupled.md,
+docs/measured/choice.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
-from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views
+from orthoscope.fitting.held_out import FEWEST_VIEWS
 from orthoscope.fitting.resection import resect
-from orthoscope.geometry.arrays import InputError
-from orthoscope.methods.decoupled.fold_fits import FoldFit
+from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.blas import with_one_thread
+from orthoscope.methods.decoupled.candidates import JOINT, PAIRS, Candidates, Model
 from orthoscope.methods.decoupled.model_selection import (
     Contender,
+    first_as_good,
     judged,
     richest_unless_worse,
     simplest_as_good,
 )
-from orthoscope.methods.decoupled.step_one import FORMULA, StepOneFit, fit_step_one
-from orthoscope.methods.decoupled.step_two import by_simplicity, formula_from_pairs
+from orthoscope.methods.decoupled.step_one import FORMULA
+from orthoscope.methods.decoupled.step_two import by_simplicity
 from orthoscope.methods.fccm import fccm
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.lenses import FREE, parse_lens
@@ -38,11 +43,10 @@ from orthoscope.models.target_shape import SHAPES
 from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__
 
-__all__ = ["decoupled"]
+__all__ = ["BASES", "decoupled"]
 
 AUTO = "auto"
-# what a candidate's lens is called after step 2, since step 1 may have tried the same formula
-FROM_PAIRS = "from pairs"
+BASES = ("brown", "kannala_brandt", "rational")  # in order of preference
 TOO_FEW = (
     f"fewer than {FEWEST_VIEWS} views cannot be judged by views that were not used; where nothing else was"
     " asked for, the target is taken to be as it is said to be, and the lens to follow its formula"
@@ -51,16 +55,20 @@ TOO_FEW = (
 Progress = Callable[[int, int], None]
 
 
-class _Plan(NamedTuple):
-    """What is left to choose: target shapes and lenses of step 1, formulas of step 2 (None: step 1's own
-    lens), each simplest first.
+class _Open(NamedTuple):
+    """What the settings leave open: base formulas, in order of preference; target shapes and lenses of step
+    1,
+    formulas to end with (none: the lens of step 1), each simplest first; how such a formula may be fitted.
     """
 
+    bases: tuple[str, ...]
     shapes: tuple[str, ...]
     through: tuple[str, ...]
-    formulas: tuple[str | None, ...]
+    formulas: tuple[str, ...]
+    fits: tuple[str, ...]
 
 
+@with_one_thread
 def decoupled(
     detections: Detections,
     *,
@@ -68,49 +76,52 @@ def decoupled(
     target: str = AUTO,
     base: str = AUTO,
     through: str = AUTO,
+    fit: str = AUTO,
     among: Sequence[str] = (),
     skew: bool = False,
-    folds: int = 5,
     judging: Progress | None = None,
 ) -> Calibration:
     """Calibrate with the target's shape estimated and a lens that no formula limits; then, where one is
     wanted, fit a lens formula.
 
-    lens: a name of LENSES (with the coefficients to free, `brown:k1,k2`), `free`, or `auto`: the free lens,
-    or out of the names in `among` the simplest that foresees views not used as well as the best. target:
-    `flat`, `smooth`, `free` or `auto`. base: the formula under the free lens; `auto` takes brown, or
-    kannala_brandt for wide views. through: the lens of step 1, `free`, `formula` (the base alone) or `auto`.
-    folds: of the views, to judge by. judging: called with (fits done, fits to do). Raises CalibrationError
-    where the views cannot tell the camera, InputError for a setting that is none.
+    Args:
+        lens: a name of LENSES (with the coefficients to free, `brown:k1,k2`), `free`, or `auto`: the lens of
+            step 1, or out of the names in `among` the simplest that foresees views not used as well as the
+            best.
+        target: its shape, `flat`, `smooth`, `free` or `auto`.
+        base: the formula under the free lens; `auto` takes, of BASES, what foresees best.
+        through: the lens of step 1, `free`, `formula` (the base alone) or `auto`.
+        fit: of a formula, `joint` (with poses and target), `pairs` (to what step 1 found) or `auto`.
+        judging: called with (models judged, models to judge).
+    Raises:
+        CalibrationError: the views cannot tell the camera.
+        InputError: a setting is none.
     """
-    plan = _plan(lens, target, through, among)
-    flat = fccm(without_outliers(detections, lens=base), lens=base, skew=skew)
-    used, base, assumptions = flat.detections, flat.settings["lens"], flat.assumptions
-    candidates: tuple[Candidate, ...] = ()
-    if len(used.views) < FEWEST_VIEWS and max(map(len, plan)) > 1:
-        plan = _Plan(plan.shapes[:1], plan.through[:1], plan.formulas[:1])
-        assumptions = (*assumptions, TOO_FEW)
-    elif max(map(len, plan)) > 1:
-        fold_fits = [
-            FoldFit(used, part, base=base, skew=skew) for part in folds_of_views(len(used.views), folds)
-        ]
-        plan, candidates = _choose(fold_fits, used, plan, base, judging)
-    shape, through, formula = plan.shapes[0], plan.through[0], plan.formulas[0]
-    fit = fit_step_one(flat, target=shape, through=through)
+    left = _open(lens, target, base, through, fit, among)
+    used = fccm(without_outliers(detections, lens=base), lens=base, skew=skew).detections
+    candidates = Candidates(used, skew=skew)
+    assumptions: tuple[str, ...] = ()
+    if len(used.views) < FEWEST_VIEWS:
+        model, told = _assumed(left, used, skew), ()
+        assumptions = (TOO_FEW,) if max(map(len, left)) > 1 else ()
+    else:
+        model, told = _chosen(candidates, left, judging)
+    flat = candidates.flat(model.base)
     settings = {
-        "lens": formula or (FREE if through == FREE else base),
-        "target": shape,
-        "base": base,
-        "through": through,
+        "lens": model.lens,
+        "target": model.target,
+        "base": model.base,
+        "through": model.through,
+        "fit": model.fit,
         "skew": skew,
     }
-    return _calibration(fit, used, settings, assumptions, candidates, flat.steps)
+    return _calibration(candidates, model, settings, (*flat.assumptions, *assumptions), told)
 
 
-def _plan(lens: str, target: str, through: str, among: Sequence[str]) -> _Plan:
+def _open(lens: str, target: str, base: str, through: str, fit: str, among: Sequence[str]) -> _Open:
     """What the settings leave open.
 
-    Raises InputError for a setting that is none.
+    Raises InputError for a setting that is none, or for two that contradict each other.
     """
     if target not in (AUTO, *SHAPES):
         raise InputError(
@@ -121,81 +132,113 @@ def _plan(lens: str, target: str, through: str, among: Sequence[str]) -> _Plan:
             f"through is {through!r}; expected 'free' (a free lens in step 1), 'formula' (its base alone) or"
             " 'auto'."
         )
+    if fit not in (AUTO, JOINT, PAIRS):
+        raise InputError(
+            f"fit is {fit!r}; expected 'joint' (a formula with poses and target), 'pairs' (a formula to what"
+            " step 1 found) or 'auto'."
+        )
     if lens == FREE and through == FORMULA:
         raise InputError(
             "lens is 'free' and through is 'formula'; expected one of the two. A free lens comes through a"
             " free lens."
         )
-    formulas = tuple(name for name in (among if lens == AUTO else (lens,)) if name != FREE)
-    for name in formulas:
+    formulas = by_simplicity(name for name in (among if lens == AUTO else (lens,)) if name != FREE)
+    for name in (*formulas, *(() if base == AUTO else (base,))):
         parse_lens(name)
     lenses_of_step_one = (FREE,) if lens == FREE else (FORMULA, FREE) if through == AUTO else (through,)
-    return _Plan(
-        SHAPES if target == AUTO else (target,), lenses_of_step_one, by_simplicity(formulas) or (None,)
+    return _Open(
+        BASES if base == AUTO else (base,),
+        SHAPES if target == AUTO else (target,),
+        lenses_of_step_one,
+        formulas,
+        (JOINT, PAIRS) if fit == AUTO else (fit,),
     )
 
 
-def _choose(
-    fold_fits: Sequence[FoldFit], used: Detections, plan: _Plan, base: str, progress: Progress | None
-) -> tuple[_Plan, tuple[Candidate, ...]]:
-    """Step 1's shape first, with its base alone, which is quick; then its lens for that shape; then the
-    formula for both.
+def _assumed(left: _Open, used: Detections, skew: bool) -> Model:
+    """The model for views that are too few to judge by: the simplest that the settings allow."""
+    shape, through, formula = left.shapes[0], left.through[0], next(iter(left.formulas), None)
+    if formula and JOINT in left.fits and through == FORMULA:
+        return Model(formula, shape, FORMULA)
+    base = left.bases[0] if len(left.bases) == 1 else fccm(used, skew=skew).settings["lens"]
+    return Model(base, shape, through, formula)
+
+
+def _chosen(
+    candidates: Candidates, left: _Open, progress: Progress | None
+) -> tuple[Model, tuple[Candidate, ...]]:
+    """The base by the richest model on it; then the target's shape and the lens of step 1; then the formula.
+
+    Raises CalibrationError where no base can be fitted.
     """
-    corners = np.array([len(view.ids) for view in used.views], dtype=float)
-    formulas = plan.formulas if len(plan.formulas) > 1 else ()
-    to_do = len(fold_fits) * (len(plan.shapes) + len(plan.through) - 1 + len(formulas))
-    done = 0
+    corners = np.array([len(view.ids) for view in candidates.detections.views], dtype=float)
+    tried: dict[Model, Contender] = {}
+    of_base = [Model(base, left.shapes[-1], left.through[-1]) for base in left.bases]
+    to_do = len(of_base) + len(left.shapes) * len(left.through) - 1 + 2 * len(left.formulas)
 
-    def contender(shape: str, through: str, formula: str | None = None) -> Contender:
-        nonlocal done
-        squares = np.full(len(corners), np.nan)
-        for fold_fit in fold_fits:
-            squares[fold_fit.part] = fold_fit.squares(shape, through, formula)
-            done += 1
-            if progress:
-                progress(done, to_do)
-        return Contender(
-            shape, f"{formula} {FROM_PAIRS}" if formula else FREE if through == FREE else base, squares
+    def judge(models: Sequence[Model]) -> list[Contender]:
+        for model in models:
+            if model not in tried:
+                tried[model] = candidates.contender(model)
+                if progress:
+                    progress(min(len(tried), to_do), to_do)
+        return [tried[model] for model in models]
+
+    if len(of_base) > 1:
+        fitting = [model for model in of_base if _can_be_fitted(candidates, model.base)] or of_base[:1]
+        base = fitting[first_as_good(judge(fitting), corners)].base
+    else:
+        base = left.bases[0]
+    models = [Model(base, shape, through) for shape, through in product(left.shapes, left.through)]
+    model = models[richest_unless_worse(judge(models), corners)] if len(models) > 1 else models[0]
+    if left.formulas:
+        models = _with_formulas(model, left)
+        model = models[simplest_as_good(judge(models), corners)] if len(models) > 1 else models[0]
+    if progress and tried:
+        progress(to_do, to_do)
+    listed = list(tried)
+    told = judged(list(tried.values()), corners, listed.index(model)) if model in tried else ()
+    return model, told
+
+
+def _can_be_fitted(candidates: Candidates, base: str) -> bool:
+    try:
+        candidates.flat(base)
+    except CalibrationError:
+        return False
+    return True
+
+
+def _with_formulas(model: Model, left: _Open) -> list[Model]:
+    """The ways to end with a formula, simplest first, the target's shape as chosen: from pairs through the
+    free lens where it is allowed; jointly where step 1 may do with a formula alone.
+    """
+    found: list[Model] = []
+    for formula in left.formulas:
+        if PAIRS in left.fits and (FREE in left.through or formula != model.base):
+            found.append(Model(model.base, model.target, FREE if FREE in left.through else FORMULA, formula))
+        if JOINT in left.fits and FORMULA in left.through and (len(left.bases) > 1 or formula in left.bases):
+            found.append(Model(formula, model.target, FORMULA))
+    if not found:
+        raise InputError(
+            f"a formula cannot be fitted {' or '.join(left.fits)} through {' or '.join(left.through)};"
+            " expected fit 'joint' with through 'formula', or fit 'pairs' with through 'free'."
         )
-
-    tried = [contender(shape, plan.through[0]) for shape in plan.shapes]
-    taken = richest_unless_worse(tried, corners)
-    shape, through, formula = (
-        plan.shapes[taken],
-        plan.through[0],
-        None if formulas else next(iter(plan.formulas)),
-    )
-    if len(plan.through) > 1:
-        tried.append(contender(shape, plan.through[1]))
-        if richest_unless_worse([tried[taken], tried[-1]], corners):
-            taken, through = len(tried) - 1, plan.through[1]
-    if formulas:
-        of_formulas = [contender(shape, through, formula) for formula in formulas]
-        best = simplest_as_good(of_formulas, corners)
-        formula, taken, tried = formulas[best], len(tried) + best, [*tried, *of_formulas]
-    return _Plan((shape,), (through,), (formula,)), judged(tried, corners, taken)
+    return found
 
 
 def _calibration(
-    fit: StepOneFit,
-    used: Detections,
+    candidates: Candidates,
+    model: Model,
     settings: dict,
     assumptions: tuple[str, ...],
-    candidates: tuple[Candidate, ...],
-    steps: int,
+    told: tuple[Candidate, ...],
 ) -> Calibration:
-    """Step 2, poses to match, and what is known about the camera."""
-    own = settings["lens"] == (FREE if settings["through"] == FREE else settings["base"])
-    if own:
-        camera, names, covariance, parameters = (
-            fit.estimate.camera,
-            fit.problem.free,
-            fit.covariance,
-            fit.evidence.parameters,
-        )
-    else:
-        camera, names = formula_from_pairs(fit, settings["lens"])
-        covariance, parameters = fit.with_formula(camera, names)
+    """The model's camera, poses to match, and what is known about them."""
+    fit, used = candidates.step_one(model.step_one), candidates.detections
+    camera, names = candidates.camera(model)
+    scatter = candidates.scatter(model)
+    k = len(names)
     shape = fit.shape
     return Calibration(
         camera=camera,
@@ -203,13 +246,14 @@ def _calibration(
         detections=used,
         method="decoupled",
         settings=settings,
-        uncertainty=Uncertainty(names, covariance),
+        uncertainty=Uncertainty(names, scatter.parameters, scatter.model[:k, :k]),
         status=fit.status,
-        steps=steps + fit.steps,
+        steps=candidates.flat(model.base).steps + fit.steps,
         version=__version__,
         assumptions=assumptions,
         target_shape=shape,
-        parameters=parameters,
-        candidates=candidates,
-        free_camera=fit.estimate.camera if settings["through"] == FREE and not own else None,
+        parameters=fit.with_formula(camera, names) if model.formula else fit.evidence.parameters,
+        candidates=told,
+        free_camera=fit.estimate.camera if model.through == FREE and model.formula else None,
+        variances=fit.evidence.variances,
     )

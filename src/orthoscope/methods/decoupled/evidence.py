@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from orthoscope.fitting.calibration import Variances
 from orthoscope.fitting.reprojection import POSE
 from orthoscope.methods.decoupled.normal_equations import SPACE, spline_unknowns
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known, Precisions
@@ -55,6 +56,16 @@ class Evidence:
     size: float
     likeness: float = 1.0
     parameters: float = float("nan")
+
+    @property
+    def variances(self) -> Variances:
+        """To be kept with a calibration."""
+        return Variances(self.noise, self.surface, self.singles, self.bend, self.size, self.likeness)
+
+    @classmethod
+    def of(cls, variances: Variances) -> Evidence:
+        """As a calibration kept it."""
+        return cls(*variances)
 
     def precisions(self, coefficients: int) -> Precisions:
         """What a problem with so many coefficients of the surface is to know."""

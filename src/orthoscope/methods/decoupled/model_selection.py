@@ -1,11 +1,21 @@
-"""Which of several candidates to take, by photographs that none of them has seen.
+"""Which of several models to take, by photographs that none of them has seen.
 
-All candidates meet the same views, so what counts is the difference from view to view, not each one's own
-scatter. Two rules: `simplest_as_good` among formulas, whose coefficients nothing holds back: the simplest
-that is within one standard error of the best (L. Breiman et al., Classification and Regression Trees, 1984,
-section 3.4.3); `richest_unless_worse` among models whose weights were found and that contain each other, so
-that a richer one costs little where it is not needed: the richest, unless another foresees better by more
-than two standard errors. docs/decoupled.md has what each rule gives on photographs.
+All models meet the same views, so what counts is the difference from view to view, not each one's own
+scatter.  Views differ by more than
+models do: one at the image's rim, foreseen by no other, is off by fifty times the others' error, and would
+decide alone.  So models are
+compared by ratios: the mean over views, weighed by their corners, of the logarithm of how many times larger
+the squared error of one is than that of the other, in standard errors of that mean.  Rules:
+
+`first_as_good`         the first that does not surely lose against the best, models coming in order of
+preference: among base formulas `simplest_as_good`      the same within one standard error, simplest first:
+among formulas whose coefficients nothing holds back
+                        (L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3)
+`richest_unless_worse`  the richest unless another foresees surely better: among models whose weights were
+found and that contain each
+                        other, so that a richer one costs little where it is not needed
+
+docs/measured/choice.md has what each rule gives, on photographs and in simulation.
 """
 
 from __future__ import annotations
@@ -19,20 +29,25 @@ from orthoscope.fitting.calibration import Candidate
 from orthoscope.fitting.held_out import rms_and_error
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["Contender", "judged", "richest_unless_worse", "simplest_as_good"]
+__all__ = ["Contender", "first_as_good", "judged", "richest_unless_worse", "simplest_as_good"]
 
 
 ABOUT, SURELY = 1.0, 2.0  # standard errors of a difference that may be chance, and that is hardly so
+NOTHING = 1e-12  # px^2 of a corner: less is no error at all
 
 
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """A candidate with the sum of squared held-out residuals of each view (m,), px^2; NaN where its fold
-    could not judge.
+    """A model with the sum of squared held-out residuals of each view (m,), px^2; NaN where the others could
+    not tell.
+
+    base, target, lens, fit: as in `Candidate`.
     """
 
+    base: str
     target: str
     lens: str
+    fit: str
     squares: Float[ndarray, " m"]
 
 
@@ -40,13 +55,23 @@ def simplest_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " 
     """The index of the first contender that loses no more than one standard error against the best;
     contenders come simplest first.
 
-    corners: of each view. Contenders that some view could not be judged with take no part, unless all are so:
-    then the first.
+    corners: of each view.
+    """
+    return first_as_good(contenders, corners, within=ABOUT)
+
+
+def first_as_good(
+    contenders: Sequence[Contender], corners: Float[ndarray, " m"], *, within: float = SURELY
+) -> int:
+    """The index of the first contender that does not surely lose against the best; contenders come in order
+    of preference.
+
+    corners: of each view.  within: standard errors that may be lost.
     """
     able = _able(contenders)
-    best = min(able, key=lambda i: contenders[i].squares.sum(), default=0)
+    best = _best(contenders, corners, able)
     return next(
-        (i for i in able if i == best or _loses(contenders[i], contenders[best], corners) <= ABOUT), 0
+        (i for i in able if i == best or _loses(contenders[i], contenders[best], corners) <= within), 0
     )
 
 
@@ -54,28 +79,13 @@ def richest_unless_worse(contenders: Sequence[Contender], corners: Float[ndarray
     """The index of the last contender, or of the best where that one gains more than two standard errors;
     contenders come simplest first.
 
-    corners: of each view. Contenders that some view could not be judged with take no part, unless all are so:
-    then the first.
+    corners: of each view.
     """
     able = _able(contenders)
     if not able:
         return 0
-    best, richest = min(able, key=lambda i: contenders[i].squares.sum()), able[-1]
+    best, richest = _best(contenders, corners, able), able[-1]
     return best if _loses(contenders[richest], contenders[best], corners) > SURELY else richest
-
-
-def _able(contenders: Sequence[Contender]) -> list[int]:
-    return [i for i, contender in enumerate(contenders) if np.isfinite(contender.squares).all()]
-
-
-def _loses(one: Contender, other: Contender, corners: Float[ndarray, " m"]) -> float:
-    """The mean squared error of one less that of the other, in standard errors of that difference, views
-    taken as independent draws.
-    """
-    excess, views = one.squares - other.squares, len(corners)
-    mean = excess.sum() / corners.sum()
-    error = np.sqrt(views / max(views - 1, 1) * ((excess - mean * corners) ** 2).sum()) / corners.sum()
-    return float(mean / error) if error > 0 else 0.0
 
 
 def judged(
@@ -84,6 +94,48 @@ def judged(
     """What to tell of the contenders."""
     errors = [rms_and_error(contender.squares, corners) for contender in contenders]
     return tuple(
-        Candidate(contender.target, contender.lens, rms, error, rms - errors[taken][0])
+        Candidate(
+            target=contender.target,
+            lens=contender.lens,
+            held_out_px=rms,
+            standard_error_px=error,
+            loses_px=rms - errors[taken][0],
+            base=contender.base,
+            fit=contender.fit,
+            views=int(np.isfinite(contender.squares).sum()),
+        )
         for contender, (rms, error) in zip(contenders, errors, strict=True)
     )
+
+
+def _able(contenders: Sequence[Contender]) -> list[int]:
+    """Those that as many views could judge as any contender: what fewer judge, rests on the others alone."""
+    counts = [int(np.isfinite(contender.squares).sum()) for contender in contenders]
+    most = max(counts, default=0)
+    return [i for i, count in enumerate(counts) if count == most and most > 0]
+
+
+def _best(contenders: Sequence[Contender], corners: Float[ndarray, " m"], able: Sequence[int]) -> int:
+    return min(able, key=lambda i: _weighed(_logarithms(contenders[i], corners), corners)[0], default=0)
+
+
+def _loses(one: Contender, other: Contender, corners: Float[ndarray, " m"]) -> float:
+    """The mean logarithm of the ratio of the two errors, in its standard errors, views taken as independent
+    draws.
+    """
+    mean, error = _weighed(_logarithms(one, corners) - _logarithms(other, corners), corners)
+    return mean / error if error > 0 else 0.0
+
+
+def _logarithms(contender: Contender, corners: Float[ndarray, " m"]) -> Float[ndarray, " m"]:
+    """Of each view's mean squared error."""
+    return np.log(np.maximum(contender.squares / corners, NOTHING))
+
+
+def _weighed(values: Float[ndarray, " m"], corners: Float[ndarray, " m"]) -> tuple[float, float]:
+    """The mean over the views that have a value, weighed by corners, and its standard error."""
+    known = np.isfinite(values)
+    values, weights, views = values[known], corners[known], int(known.sum())
+    mean = float(values @ weights / weights.sum())
+    error = np.sqrt(views / max(views - 1, 1) * ((weights * (values - mean)) ** 2).sum()) / weights.sum()
+    return mean, float(error)

@@ -22,6 +22,7 @@ import numpy as np
 
 from orthoscope.fitting.observations import Chunk, Observations, Poses
 from orthoscope.fitting.reprojection import POSE, Estimate, Places, Reprojection
+from orthoscope.fitting.residual_slopes import by_corner, spline_values
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.free_lens import FreeLens
@@ -106,14 +107,14 @@ class Measurements:
                 cost += part
                 _add_camera_and_poses(sums, stacked, chunk.rows, k)
                 turned = (
-                    _by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows])
+                    by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows])
                     if self.corners_move
                     else None
                 )
                 if turned is not None:
                     _add_corners(sums, stacked, turned, chunk.rows, k)
                 if isinstance(camera.lens, FreeLens):
-                    design = _design(camera.lens, poses.only(chunk.rows), points) * root[:, :, None]
+                    design = spline_values(camera.lens, poses.only(chunk.rows), points) * root[:, :, None]
                     frame = camera.lens_frame or camera.intrinsics
                     _add_spline(sums, design, stacked, chunk.rows, k, frame)
                     if turned is not None:
@@ -160,15 +161,6 @@ def _residuals(stacked: Float[ndarray, "v columns n2"]) -> Float[ndarray, "v n 2
     return stacked[:, -1].reshape(len(stacked), 2, -1).transpose(0, 2, 1)
 
 
-def _by_corner(
-    by_translation: Float[ndarray, "v 3 n2"], rotation: Float[ndarray, "v 3 3"]
-) -> Float[ndarray, "v n 3 2"]:
-    """d(u, v) by the place of each corner in the target's frame."""
-    views, _, rows = by_translation.shape
-    turned = (rotation.transpose(0, 2, 1) @ by_translation).reshape(views, SPACE, 2, rows // 2)
-    return np.ascontiguousarray(turned.transpose(0, 3, 1, 2))
-
-
 def _add_camera_and_poses(sums: MeasurementSums, stacked: ndarray, rows: slice, k: int) -> None:
     gram = stacked @ stacked.transpose(0, 2, 1)
     sums.zz[:k, :k] += gram[:, :k, :k].sum(0)
@@ -178,18 +170,12 @@ def _add_camera_and_poses(sums: MeasurementSums, stacked: ndarray, rows: slice, 
 
 def _add_corners(sums: MeasurementSums, stacked: ndarray, turned: ndarray, rows: slice, k: int) -> None:
     views, columns, _ = stacked.shape
-    by_corner = stacked.reshape(views, columns, 2, -1).transpose(0, 3, 2, 1)  # (views, n, 2, columns)
-    products = turned @ by_corner
+    of_corner = stacked.reshape(views, columns, 2, -1).transpose(0, 3, 2, 1)  # (views, n, 2, columns)
+    products = turned @ of_corner
     sums.zc[:, :k] += products[..., :k].sum(0).transpose(0, 2, 1)
     sums.cc[:] += (turned @ turned.transpose(0, 1, 3, 2)).sum(0)
     sums.c[:] += products[..., -1].sum(0)
     sums.vc[rows] = products[..., k:-1].transpose(0, 1, 3, 2)
-
-
-def _design(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "v p g"]:
-    """The value of every spline at every corner's place in the base's distorted plane."""
-    in_camera = np.einsum("vab,pb->avp", poses.rotation, points) + poses.translation.T[:, :, None]
-    return lens.over.lattice.design(*lens.base.warp(*lens.chart.flatten(*in_camera)))
 
 
 def _add_spline(

@@ -67,9 +67,9 @@ class StepOneFit:
         """How errors count, for noise as large as was found."""
         return _loss(self.evidence.noise)
 
-    def with_formula(self, camera: Camera, free: Sequence[str]) -> tuple[Float[ndarray, "k k"], float]:
-        """For another camera in the place of the estimate's: covariance of its free parameters, and how many
-        the data determine in all.
+    def with_formula(self, camera: Camera, free: Sequence[str]) -> float:
+        """For another camera in the place of the estimate's: how many parameters the data determine in
+        all.
         """
         problem = self.problem
         measurements = Measurements(problem.measurements.observations, camera, free)
@@ -81,9 +81,7 @@ class StepOneFit:
             precisions=problem.precisions,
         )  # fmt: skip
         known = other.known(other.linearise(self.estimate._replace(camera=camera), self.loss))
-        return self.evidence.noise * known.camera, len(free) + float(
-            known.surface.sum() + known.singles.sum()
-        )
+        return len(free) + float(known.surface.sum() + known.singles.sum())
 
     @property
     def shape(self) -> TargetShape:

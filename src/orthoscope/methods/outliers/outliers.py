@@ -29,7 +29,7 @@ from orthoscope.fitting.observations import Observations, Poses
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, Int, ndarray
-from orthoscope.methods.fccm import fccm
+from orthoscope.methods.fccm import fit_flat
 from orthoscope.methods.outliers.residual_tests import LEAST, OUTLYING, Believed, judged, noise_of, sizes_of
 from orthoscope.methods.outliers.view_polynomial import trends
 from orthoscope.solve.least_squares import Options, solve
@@ -160,7 +160,7 @@ def _from_near(
 ) -> Calibration:
     """FCCM of these rows' near corners, robustly."""
     chosen = replace(used, views=_views(used, observations.order[rows], near[rows]), set_aside=())
-    return fccm(chosen, lens=lens, loss="cauchy", loss_scale=START_SCALE * max(used.image_size))
+    return fit_flat(chosen, lens=lens, loss="cauchy", loss_scale=START_SCALE * max(used.image_size))
 
 
 def _settled(believed: Believed, points: Float[ndarray, "p 3"]) -> tuple[Believed, dict[int, str]]:

@@ -1,0 +1,200 @@
+"""Boards that look alike both ways up: which way each view lists its corners, decided by all views together.
+
+A chessboard of 9x7 or 8x6 inner corners is its own image turned by half a turn, one of 7x7 by a quarter: a
+detector lists its corners from one end in this photograph and from the other in that.  To a flat target it is
+all the same, since the pose turns with it; but a real board is bent, stretched and printed unevenly, and then
+two orders mean two boards.
+
+With the flat fit linearised, a view that lists its corners turned by g has the residual  y_j + A_j T_g x  for
+a camera and one smooth shape x of the board; T_g shows the shape as the view's own list sees it.  Each view
+in turn is taken for the one that is right: the shape that it alone tells gives every other view its best
+turn, the shape is found anew from all, and so on until nothing changes.  The best end is taken where it is
+surely better than the lists as they came.  A board without a shape of its own gains by no turn: nothing is
+changed, and nothing lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.residual_slopes import slopes_of
+from orthoscope.geometry.arrays import Float, Int, ndarray
+from orthoscope.geometry.pose import Pose
+from orthoscope.models.target_shape import polynomials
+from orthoscope.targets.detections import Target, View
+
+__all__ = ["Turn", "in_one_order", "turns_of"]
+
+FEWEST = 3  # views: of two, either may be the one that is turned
+LIKELY = 1e-3  # of the target's size: the standard deviation of a smooth shape's coefficients
+SURE = 10.0  # times the noise's variance, for each view that is turned: chance gives no such gain
+ROUNDS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """One way in which a target is its own image.
+
+    Args:
+        rotation: (3,3) about the middle of its points.
+        corners: (p,) which corner each one comes to lie on.
+    """
+
+    rotation: Float[ndarray, "3 3"]
+    corners: Int[ndarray, " p"]
+
+
+def turns_of(target: Target) -> list[Turn]:
+    """The turns that a detector cannot tell from none, the turn by nothing first.
+
+    A chessboard's two colours change places unless both of its counts are odd, or both even.
+    """
+    found = [Turn(np.eye(3), np.arange(len(target.points)))]
+    if target.grid is None or sum(target.grid) % 2:
+        return found
+    columns, rows = target.grid
+    ids = np.arange(rows * columns).reshape(rows, columns)
+    for quarters in (1, 2, 3) if rows == columns else (2,):
+        cos, sin = round(np.cos(0.5 * np.pi * quarters)), round(np.sin(0.5 * np.pi * quarters))
+        rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        corners = np.empty(rows * columns, dtype=np.int64)
+        corners[ids.ravel()] = np.rot90(ids, quarters).ravel()
+        found.append(Turn(rotation, corners))
+    return found
+
+
+def in_one_order(flat: Calibration) -> Calibration:
+    """The calibration with a flat target, the corners of all views listed from the same end of the target;
+    poses turn with them.
+    """
+    turns = turns_of(flat.detections.target)
+    if len(turns) < 2 or len(flat.detections.views) < FEWEST or flat.camera.lens_frame is not None:
+        return flat
+    chosen = _chosen(_Sums.of(flat, turns))
+    if not chosen.any():
+        return flat
+    views, poses = [], []
+    middle = flat.detections.target.points.mean(0)
+    for view, pose, turn in zip(flat.detections.views, flat.camera_from_target, chosen, strict=True):
+        back = turns[turn]
+        ids = back.corners[view.ids]
+        order = np.argsort(ids)
+        views.append(View(view.image, ids[order], view.pixels[order]) if turn else view)
+        rotation = pose.rotation @ back.rotation.T
+        shift = pose.translation + pose.rotation @ middle - rotation @ middle
+        poses.append(Pose(rotation, shift) if turn else pose)
+    outliers = []
+    turned = dict(zip((view.image for view in views), chosen, strict=True))
+    for outlier in flat.detections.outliers:
+        corners = turns[turned.get(outlier.image, 0)].corners
+        outliers.append(outlier._replace(id=int(corners[outlier.id])))
+    detections = replace(flat.detections, views=tuple(views), outliers=tuple(outliers))
+    return replace(flat, detections=detections, camera_from_target=tuple(poses))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """The normal equations of each view under each turn: gram (m,g,c,c), right (m,g,c); prior (c,c); square:
+    |y|^2 of all; freedom: of the residuals when all is fitted; named: how many of the c unknowns are the
+    camera's.
+    """
+
+    gram: ndarray
+    right: ndarray
+    prior: ndarray
+    square: float
+    freedom: int
+    named: int
+
+    @classmethod
+    def of(cls, flat: Calibration, turns: list[Turn]) -> _Sums:
+        points, free = flat.detections.target.points, flat.uncertainty.names
+        observations = Observations.by_corner(flat.detections)
+        poses = observations.poses_of(flat.camera_from_target)
+        slopes, residual = slopes_of(observations, flat.camera, poses, points, free, moves=True)
+        m, p = observations.present.shape
+        pose = np.linalg.qr(slopes.pose.transpose(0, 2, 1))[0]
+        smooth = polynomials(points, np.ones(p, dtype=bool))
+        r, k = smooth.shape[1], len(free)
+        y = _without(pose, residual[..., None])
+        gram, right = np.empty((m, len(turns), k + 3 * r, k + 3 * r)), np.empty((m, len(turns), k + 3 * r))
+        for i, turn in enumerate(turns):
+            shown = smooth[turn.corners][:, None, :, None] * turn.rotation.T[None, :, None, :]  # (p, 3, r, 3)
+            pairs = slopes.corner @ shown.reshape(p, 3, 3 * r)  # (m, p, 2, 3r)
+            rows = np.concatenate([pairs[:, :, 0], pairs[:, :, 1]], axis=1)
+            columns = _without(pose, np.concatenate([slopes.camera.transpose(0, 2, 1), rows], axis=2))
+            gram[:, i] = columns.transpose(0, 2, 1) @ columns
+            right[:, i] = (columns.transpose(0, 2, 1) @ y)[..., 0]
+        freedom = 2 * observations.corners - 6 * m - k
+        square = float((y**2).sum())
+        size = float(np.ptp(points[:, :2], axis=0).max())
+        precision = square / max(freedom, 1) / (LIKELY * size) ** 2
+        prior = np.diag(np.concatenate([1e-9 * np.diag(gram[:, 0].sum(0))[:k], np.full(3 * r, precision)]))
+        return cls(gram, right, prior, square, freedom, k)
+
+    def shape(self, turns: Int[ndarray, " m"], views: Int[ndarray, " v"]) -> Float[ndarray, " c"]:
+        """Camera and shape that some views tell together, each turned as said."""
+        gram, right = self.gram[views, turns[views]].sum(0), self.right[views, turns[views]].sum(0)
+        return -np.linalg.solve(gram + self.prior, right)
+
+    def costs(self, x: Float[ndarray, " c"]) -> Float[ndarray, "m g"]:
+        """What each view costs under each turn, |y|^2 apart."""
+        return 2.0 * self.right @ x + (self.gram @ x) @ x
+
+    def total(self, turns: Int[ndarray, " m"]) -> tuple[float, Float[ndarray, " c"]]:
+        """The least cost for these turns, |y|^2 apart, and where it is."""
+        every = np.arange(len(turns))
+        x = self.shape(turns, every)
+        return float(self.costs(x)[every, turns].sum() + x @ self.prior @ x), x
+
+    def likeness(self, turns: Int[ndarray, " m"], x: Float[ndarray, " c"], noise: float) -> float:
+        """How much larger smooth patterns are in what is left of each view than independent errors make
+        them.
+        """
+        every = np.arange(len(turns))
+        gram = self.gram[every, turns][:, self.named :, self.named :]
+        left = (self.right[every, turns] + self.gram[every, turns] @ x)[:, self.named :]
+        values, vectors = np.linalg.eigh(gram)
+        told = values > 1e-6 * values.max(1, keepdims=True)
+        found = (vectors.transpose(0, 2, 1) @ left[..., None])[..., 0] ** 2 / np.where(told, values, 1.0)
+        return max(1.0, float(found[told].sum()) / (noise * max(int(told.sum()), 1)))
+
+
+def _chosen(sums: _Sums) -> Int[ndarray, " m"]:
+    """The turn of each view, 0 where it stays; all 0 where no turns are surely better."""
+    m, turns = sums.gram.shape[:2]
+    none = np.zeros(m, dtype=np.int64)
+    before, _ = sums.total(none)
+    best, cost = none, before
+    for first in range(m):
+        tried = none.copy()
+        told = sums.shape(tried, np.array([first]))
+        for _ in range(ROUNDS):
+            before_this, tried = tried, sums.costs(told).argmin(1)
+            if (tried == before_this).all():
+                break
+            told = sums.shape(tried, np.arange(m))
+        total, _ = sums.total(tried)
+        if total < cost - 1e-9 * sums.square:
+            best, cost = tried, total
+    best = _least_turned(best, turns)
+    noise = max(sums.square + cost, 1e-12 * sums.square) / max(sums.freedom, 1)
+    needed = SURE * noise * sums.likeness(best, sums.total(best)[1], noise) * max(int((best > 0).sum()), 1)
+    return best if before - cost > needed else none
+
+
+def _least_turned(chosen: Int[ndarray, " m"], turns: int) -> Int[ndarray, " m"]:
+    """The same order of all views against each other, with as few of them turned as can be."""
+    quarters = {1: 1, 2: 2, 4: 4}[turns]
+    return min(
+        ((chosen - shift) % quarters for shift in range(quarters)), key=lambda some: int((some > 0).sum())
+    )
+
+
+def _without(basis: Float[ndarray, "m n 6"], columns: Float[ndarray, "m n c"]) -> Float[ndarray, "m n c"]:
+    """What a pose cannot do of the columns of each view."""
+    return columns - basis @ (basis.transpose(0, 2, 1) @ columns)

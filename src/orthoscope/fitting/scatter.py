@@ -1,0 +1,141 @@
+"""How a camera scatters: what its own fit says of it, and what leaving views out says.
+
+Four covariances of a camera's unknowns (its named parameters, then its displacement's coefficients), all of
+them by one linear step:
+
+model      independent errors of corners, and the priors' own scatter: noise H^-1
+prior      the second of these alone: noise H^-1 L H^-1
+alike      `model`, with errors that are alike within a view: smooth patterns of order 2, 3 and 4 over the
+           board count tau_o times, as often as they are larger in the residuals than independent errors make
+           them
+jackknife  from how the camera moves when each view is left out (leave_one_out.py); it sees what lives in the
+           camera itself, such as a focal length that breathes, and boards that bend from view to view
+
+`alike` knows independent errors best and few views well; the jackknife holds whatever the errors are, but
+leaves out what no view can show, so the priors' part is added to it.  Neither is ever too large by much, so
+the larger of the two is believed (camera_error.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of
+from orthoscope.fitting.linearised import Linearised
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import polynomials
+
+__all__ = ["ORDERS", "Scatter", "likenesses", "patterns_over_views", "scatter_of"]
+
+ORDERS = (
+    2,
+    3,
+    4,
+)  # of patterns over a board: a pose takes those below, and of those above errors are as good as independent
+ENOUGH = 40  # views that tell how alike errors are
+# of a pattern's length: what is left of it after pose and patterns before it is rounding when it is no more
+THIN = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """What is known of how far a camera is from the true one, to first order.
+
+    Args:
+        camera: where its fit ended.
+        names: of its k parameters that moved; the displacement's coefficients, along x and then along y, come
+            after them.
+        model, alike, prior: (d,d) covariances.
+        left_out: (m,d) rows whose products sum to the jackknife's covariance; NaN for views that the others
+            cannot tell.
+    """
+
+    camera: Camera
+    names: tuple[str, ...]
+    model: Float[ndarray, "d d"]
+    alike: Float[ndarray, "d d"]
+    prior: Float[ndarray, "d d"]
+    left_out: Float[ndarray, "m d"]
+
+    @cached_property
+    def jackknife(self) -> Float[ndarray, "d d"]:
+        """The jackknife's covariance, views that the others cannot tell left out."""
+        known = self.left_out[np.isfinite(self.left_out).all(1)]
+        return known.T @ known
+
+    @property
+    def parameters(self) -> Float[ndarray, "k k"]:
+        """Covariance of the named parameters: of each the larger deviation, correlated as the model says."""
+        k = len(self.names)
+        model = self.alike[:k, :k]
+        of_model = np.sqrt(np.maximum(np.diag(model), 1e-300))
+        by_views = np.sqrt(np.maximum(np.diag(self.jackknife + self.prior)[:k], 0.0))
+        larger = np.maximum(by_views / of_model, 1.0)
+        return model * larger * larger[:, None]
+
+
+def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p 3"]) -> Scatter:
+    """The scatter of a camera that was fitted together with poses and shape.
+
+    Args:
+        points: the target's corners, nominal.
+    """
+    some = fit.only(_evenly(fit.views, ENOUGH))
+    patterns = patterns_over_views(some, points)
+    tau = likenesses(some, patterns)
+    camera = np.zeros((fit.of_camera, fit.of_camera))
+    for rows, larger in zip(patterns, tau, strict=True):
+        if larger > 1.0:
+            by_camera = fit.camera_columns.T @ some.pulls(rows).transpose(1, 0, 2).reshape(fit.unknowns, -1)
+            camera += (larger - 1.0) * by_camera @ by_camera.T
+    alike = fit.camera_covariance + fit.noise * fit.views / some.views * camera
+    return Scatter(
+        fit.camera, fit.names, fit.camera_covariance, alike, fit.prior_covariance, left_out.scatter
+    )
+
+
+def patterns_over_views(
+    fit: Linearised, points: Float[ndarray, "p 3"], *, orders: Sequence[int] = ORDERS
+) -> list[Float[ndarray, "_ _ _"]]:
+    """Smooth patterns over the board, in u and in v, as weighted residuals of each view: orthonormal, pose
+    and lower orders taken out.
+
+    Args:
+        points: the target's corners, nominal.
+    Returns:
+        For each order its patterns; those that a view's corners cannot show are 0 there.
+    """
+    seen = np.any(fit.root[:, : len(points)] > 0, axis=0)
+    columns, sizes = [], []
+    for order in orders:
+        smooth = polynomials(points, seen, orders=(order,))
+        zero = np.zeros_like(smooth)
+        columns.append(np.block([[smooth, zero], [zero, smooth]]))
+        sizes.append(columns[-1].shape[1])
+    raw = fit.root[..., None] * np.concatenate(columns, axis=1)
+    rows = fit.without_pose(raw)
+    basis, triangle = np.linalg.qr(rows)
+    kept = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) > THIN * np.sqrt((raw**2).sum(1))
+    basis = fit.without_pose(basis * kept[:, None])
+    return np.split(basis, np.cumsum(sizes)[:-1], axis=2)
+
+
+def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "_ _ _"]]) -> tuple[float, ...]:
+    """tau_o, 1 or more: how much larger each order's patterns are in the residuals than independent errors
+    would make them.
+    """
+    found = []
+    for rows in patterns:
+        in_residuals = ((fit.errors[:, None] @ rows) ** 2).sum()
+        by_chance = fit.noise * float((rows**2).sum() - (rows * hat_of(fit, rows)).sum())
+        found.append(max(1.0, float(in_residuals) / max(by_chance, 1e-300)))
+    return tuple(found)
+
+
+def _evenly(views: int, wanted: int) -> ndarray:
+    return np.unique(np.linspace(0, views - 1, wanted).round().astype(int))

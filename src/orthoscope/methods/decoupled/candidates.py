@@ -1,0 +1,123 @@
+"""The models that the default method chooses among, each fitted once and judged on every view without it.
+
+A model is a base formula, a shape of the target, a lens of step 1 and, where a formula is wanted, how it is
+fitted: jointly (it is then the base itself, alone) or from the pairs of step 1.  What models share is fitted
+once: the flat start of a base, step 1 for every formula from its pairs.  Each is judged by leaving one view
+out after the other, by one linear step (fitting/leave_one_out.py): the order of the views cannot matter, and
+no photograph is foreseen by so few others that another choice would have been right for them.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
+from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.scatter import Scatter, scatter_of
+from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.methods.decoupled.model_selection import Contender
+from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
+from orthoscope.methods.decoupled.step_one_linearised import linearised
+from orthoscope.methods.decoupled.step_two import formula_from_pairs
+from orthoscope.methods.decoupled.step_two_linearised import PairsLeftOut
+from orthoscope.methods.fccm import fit_flat
+from orthoscope.models.camera import Camera
+from orthoscope.models.lenses import FREE
+from orthoscope.targets.detections import Detections
+
+__all__ = ["JOINT", "PAIRS", "Candidates", "Model"]
+
+JOINT, PAIRS = "joint", "pairs"
+
+
+class Model(NamedTuple):
+    """One way to explain the photographs.
+
+    base: a formula.  target: the kind of its shape.  through: `free` or `formula`, the lens of step 1.
+    formula: fitted to the pairs of step 1; None where step 1's camera is taken as it is.
+    """
+
+    base: str
+    target: str
+    through: str
+    formula: str | None = None
+
+    @property
+    def lens(self) -> str:
+        """What the camera's lens is called."""
+        return self.formula or (FREE if self.through == FREE else self.base)
+
+    @property
+    def fit(self) -> str:
+        """How the lens was fitted."""
+        return PAIRS if self.formula else JOINT
+
+    @property
+    def step_one(self) -> Model:
+        """The model whose fit of step 1 this one rests on."""
+        return self._replace(formula=None)
+
+
+class Candidates:
+    """Models fitted to the same photographs, each when it is asked for, and once.
+
+    detections: views that belong.  skew: whether K has one.
+    """
+
+    def __init__(self, detections: Detections, *, skew: bool) -> None:
+        self.detections, self._skew = detections, skew
+        self.flat, self.step_one = cache(self._flat), cache(self._step_one)
+        self.linearised, self.left_out = cache(self._linearised), cache(self._left_out)
+        self.from_pairs = cache(self._from_pairs)
+
+    def contender(self, model: Model) -> Contender:
+        """The model with its squared held-out residuals; NaN in views where the others cannot tell, or in all
+        where it cannot be fitted.
+        """
+        try:
+            squares = self._squares(model)
+        except CalibrationError:
+            squares = np.full(len(self.detections.views), np.nan)
+        return Contender(model.base, model.target, model.lens, model.fit, squares)
+
+    def camera(self, model: Model) -> tuple[Camera, tuple[str, ...]]:
+        """The model's camera, and the names of its parameters that were fitted.
+
+        Raises CalibrationError where the views cannot tell them.
+        """
+        fit = self.step_one(model.step_one)
+        return (
+            formula_from_pairs(fit, model.formula)
+            if model.formula
+            else (fit.estimate.camera, fit.problem.free)
+        )
+
+    def scatter(self, model: Model) -> Scatter:
+        """How the model's camera scatters."""
+        if model.formula:
+            return self.from_pairs(model).scatter()
+        return scatter_of(self.linearised(model), self.left_out(model), self.detections.target.points)
+
+    def _squares(self, model: Model) -> Float[ndarray, " m"]:
+        return self.from_pairs(model).squares if model.formula else self.left_out(model).squares
+
+    def _flat(self, base: str) -> Calibration:
+        return fit_flat(self.detections, lens=base, skew=self._skew)
+
+    def _step_one(self, model: Model) -> StepOneFit:
+        return fit_step_one(self.flat(model.base), target=model.target, through=model.through)
+
+    def _linearised(self, model: Model) -> Linearised:
+        return linearised(self.step_one(model))
+
+    def _left_out(self, model: Model) -> LeaveOneOut:
+        return leave_one_out(self.linearised(model))
+
+    def _from_pairs(self, model: Model) -> PairsLeftOut:
+        first = model.step_one
+        camera, free = self.camera(model)
+        return PairsLeftOut(self.step_one(first), self.linearised(first), self.left_out(first), camera, free)

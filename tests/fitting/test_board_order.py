@@ -1,0 +1,84 @@
+"""Boards that look alike both ways up, their corners listed from either end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from helpers.bent_boards import bowed, drawn, photographed_with
+from helpers.scenes import NARROW
+from orthoscope.fitting.board_order import in_one_order, turns_of
+from orthoscope.methods.decoupled.decoupled import decoupled
+from orthoscope.methods.fccm import fccm, fit_flat
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target, chessboard
+
+ALIKE = {"half a turn": chessboard(8, 6, 0.025), "a quarter": chessboard(7, 7, 0.025)}
+for_every_alike = pytest.mark.parametrize("target", ALIKE.values(), ids=ALIKE.keys())
+
+
+def shape_of(target: Target) -> np.ndarray:
+    """Bent to one side more than to the other, and each corner a little off."""
+    x = target.points[:, 0] / np.ptp(target.points[:, 0])
+    return bowed(1e-3, target) * (1.0 + x)[:, None] + drawn((1e-4, 1e-4, 1e-4), target)
+
+
+def listed_from_elsewhere(detections: Detections, turns: dict[int, int]) -> Detections:
+    """The corners of these views listed by a detector that began at another corner: turns by view."""
+    known, views = turns_of(detections.target), list(detections.views)
+    for view, turn in turns.items():
+        back = np.argsort(known[turn].corners)
+        ids = back[views[view].ids]
+        order = np.argsort(ids)
+        views[view] = View(views[view].image, ids[order], views[view].pixels[order])
+    return replace(detections, views=tuple(views))
+
+
+@for_every_alike
+def test_a_turn_brings_every_corner_to_where_another_was(target: Target):
+    middle = target.points.mean(0)
+    for turn in turns_of(target):
+        assert_allclose(
+            (target.points - middle) @ turn.rotation.T, target.points[turn.corners] - middle, atol=1e-12
+        )
+
+
+def test_a_board_whose_colours_tell_its_ends_has_no_turns():
+    assert len(turns_of(chessboard(9, 6, 0.025))) == 1
+    assert len(turns_of(chessboard(9, 7, 0.025))) == 2
+    assert len(turns_of(chessboard(7, 7, 0.025))) == 4
+
+
+@for_every_alike
+def test_views_that_were_listed_from_another_end_are_found_and_turned_back(target: Target):
+    right = photographed_with(shape_of(target), NARROW, 10, target=target, noise_px=0.1)
+    last = len(turns_of(target)) - 1
+    wrong = listed_from_elsewhere(right, {1: 1, 4: last, 6: 1, 7: last})
+    found, expected = fccm(wrong), fccm(right)
+    for view, as_it_was in zip(found.detections.views, right.views, strict=True):
+        assert_array_equal(view.ids, as_it_was.ids)
+        assert_array_equal(view.pixels, as_it_was.pixels)
+    assert found.rms_px == pytest.approx(expected.rms_px, rel=1e-6)  # the poses turned with them
+    assert_allclose(found.camera.intrinsics.as_tuple(), expected.camera.intrinsics.as_tuple(), rtol=1e-6)
+
+
+def test_what_turned_views_give_is_what_consistent_ones_give():
+    target = ALIKE["half a turn"]
+    right = photographed_with(shape_of(target), NARROW, 8, target=target, noise_px=0.1, seed=2)
+    settings = {"target": "free", "through": "formula", "base": "brown"}
+    found = decoupled(listed_from_elsewhere(right, {0: 1, 2: 1, 3: 1}), **settings)
+    expected = decoupled(right, **settings)
+    assert found.rms_px == pytest.approx(expected.rms_px, rel=1e-4)
+    assert found.target_shape.rms == pytest.approx(expected.target_shape.rms, rel=1e-3)
+
+
+@for_every_alike
+@pytest.mark.parametrize("seed", range(4))
+def test_a_perfect_board_has_no_end_that_anyone_could_tell_and_is_left_as_it_is(target: Target, seed: int):
+    flat = fit_flat(
+        photographed_with(0.0 * shape_of(target), NARROW, 8, target=target, noise_px=0.2, seed=seed)
+    )
+    assert in_one_order(flat) is flat

@@ -1,0 +1,106 @@
+"""A view left out by one linear step, beside the fit that never had it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from helpers.bent_boards import bowed, photographed_with
+from helpers.scenes import NARROW
+from orthoscope.fitting.calibration import residuals_of
+from orthoscope.fitting.leave_one_out import hat_of, leave_one_out
+from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.resection import resect
+from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
+from orthoscope.methods.decoupled.step_one_linearised import linearised
+from orthoscope.methods.fccm import fccm
+from orthoscope.targets.detections import Detections
+
+KINDS = [("flat", "formula"), ("smooth", "formula"), ("free", "formula"), ("flat", "free"), ("free", "free")]
+
+
+@pytest.fixture(scope="module")
+def photographs() -> Detections:
+    return photographed_with(bowed(0.5e-3), NARROW, 8, noise_px=0.1, seed=3)
+
+
+def fitted(photographs: Detections, shape: str, through: str) -> StepOneFit:
+    return fit_step_one(fccm(photographs, lens="brown"), target=shape, through=through)
+
+
+@pytest.fixture(scope="module", params=KINDS, ids="-".join)
+def fit(photographs: Detections, request: pytest.FixtureRequest) -> tuple[StepOneFit, Linearised]:
+    found = fitted(photographs, *request.param)
+    return found, linearised(found)
+
+
+def test_pulls_are_the_transpose_of_moves(fit: tuple[StepOneFit, Linearised]):
+    rng = np.random.default_rng(0)
+    known = fit[1]
+    x, rows = (
+        rng.standard_normal((known.views, known.unknowns, 2)),
+        rng.standard_normal((*known.residual.shape, 2)),
+    )
+    assert_allclose((known.moves(x) * rows).sum(), (x * known.pulls(rows)).sum(), rtol=1e-9)
+
+
+def test_what_views_and_priors_say_together_is_undone_by_solved(fit: tuple[StepOneFit, Linearised]):
+    known = fit[1]
+    x = (
+        np.random.default_rng(0).standard_normal((known.unknowns, 1))
+        * np.sqrt(np.maximum(_diagonal(known), 0.0))[:, None]
+    )
+    k, g, _, _ = known.slopes.sizes
+    together = known.pulls(known.moves(x)).sum(0)
+    for i in (0, 1):
+        part = slice(k + i * g, k + (i + 1) * g)
+        together[part] += known.spline_precision @ x[part]
+    together[k + 2 * g :] += known.shape_precision[:, None] * x[k + 2 * g :]
+    assert_allclose(
+        known.solved(together) / np.abs(x), np.sign(x), atol=2e-3
+    )  # of the smallest of unknowns that differ by 1e6
+
+
+def _diagonal(known: Linearised) -> np.ndarray:
+    return np.concatenate([np.diag(known.camera_columns), np.ones(known.unknowns - known.of_camera) * 1e-6])
+
+
+def test_the_camera_scatters_as_the_fit_says(fit: tuple[StepOneFit, Linearised]):
+    found, known = fit
+    k = len(known.names)
+    assert_allclose(
+        np.sqrt(np.diag(known.camera_covariance)[:k]), np.sqrt(np.diag(found.covariance)), rtol=1e-2
+    )
+    assert (np.diag(known.prior_covariance) <= np.diag(known.camera_covariance) * (1 + 1e-6)).all()
+
+
+def test_a_view_left_out_by_one_step_is_foreseen_as_by_the_fit_that_never_had_it(
+    fit: tuple[StepOneFit, Linearised], photographs: Detections
+):
+    found, known = fit
+    by_step = np.sqrt(leave_one_out(known).squares)
+    for j in (0, 5):
+        others, tested = photographs.only([i for i in range(8) if i != j]), photographs.only([j])
+        without = fitted(others, found.target, "free" if known.slopes.sizes[1] else "formula")
+        poses = resect(without.estimate.camera, tested, shape=without.shape)
+        (residuals,) = residuals_of(without.estimate.camera, poses, tested, shape=without.shape)
+        assert by_step[j] == pytest.approx(
+            np.sqrt((residuals**2).sum()), rel=0.04
+        )  # weights are found anew, the step is linear
+
+
+def test_what_a_view_alone_decides_is_no_more_than_itself(fit: tuple[StepOneFit, Linearised]):
+    known = fit[1]
+    rows = np.random.default_rng(1).standard_normal((*known.residual.shape, 1)) * (known.root > 0)[..., None]
+    share = (rows * hat_of(known, rows)).sum((1, 2)) / (rows**2).sum((1, 2))
+    assert (share >= 0.0).all()
+    assert (share < 1.0).all()
+
+
+def test_the_order_of_the_views_does_not_matter(photographs: Detections):
+    backwards = photographs.only(range(7, -1, -1))
+    forth, back = (
+        leave_one_out(linearised(fitted(some, "smooth", "formula"))) for some in (photographs, backwards)
+    )
+    assert_allclose(forth.squares, back.squares[::-1], rtol=1e-5)
