@@ -179,7 +179,8 @@ def _content(path: Path, most_megapixels: float) -> bytes:
     if width * height > most_megapixels * 1e6:
         raise InputError(
             f"{path} says that it is {width}x{height}, {width * height / 1e6:.0f} megapixels; expected at"
-            f" most {most_megapixels:g}. Raise --max-megapixels if it is a photograph."
+            f" most {most_megapixels:g}. Allow more (most_megapixels; detect --max-megapixels) if it is a"
+            " photograph."
         )
     return checked_whole(content, path)
 
