@@ -129,7 +129,8 @@ class _Film:
             raise InputError(
                 f"{place} cannot be written ({error.strerror}); choose another place."
             ) from error
-        code = cv2.VideoWriter_fourcc(*CODECS[suffix])  # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
+        # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
+        code = cv2.VideoWriter_fourcc(*CODECS[suffix])
         self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.camera.image_size)
 
     def __enter__(self) -> cv2.VideoWriter:
