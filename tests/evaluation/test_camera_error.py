@@ -80,19 +80,19 @@ def test_the_prediction_is_in_the_pixels_that_the_camera_is_off(noisy: Detection
 @pytest.mark.slow
 def test_the_models_own_part_is_the_scatter_over_repeated_photographs():
     clean = photographed(NARROW, 10)
-    rng, where = np.random.default_rng(1), places(clean)
-    said, errors = [], []
-    for _ in range(40):
+    rng, where = np.random.default_rng(7), places(clean)
+    model = scattered(photographed(NARROW, 10, noise_px=0.1))
+    said = predicted_error(model, where, distance=0.5).model_px
+    errors = []
+    for _ in range(200):
         views = [
             replace(view, pixels=view.pixels + 0.1 * rng.standard_normal(view.pixels.shape))
             for view in clean.views
         ]
-        again = replace(clean, views=tuple(views))
-        scatter = scattered(again)
-        said.append(predicted_error(scatter, where, distance=0.5).model_px)
-        errors.append(rms_difference(scatter.camera, NARROW, where))
-    # 40 sets of an error of some nine degrees of freedom: its rms is known to about 8 %
-    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.mean(said), rel=0.2)
+        found = fit_flat(replace(clean, views=tuple(views)), lens="brown").camera
+        errors.append(rms_difference(found, NARROW, where))
+    # far away two or three degrees of freedom make most of the error: over 200 sets its rms is known to 4 %
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(said, rel=0.15)
 
 
 def test_more_unknowns_make_no_deviation_smaller(noisy: Detections):

@@ -19,15 +19,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.resection import resect
 from orthoscope.fitting.residual_slopes import slopes_of
-from orthoscope.geometry.arrays import Float, Int, ndarray
+from orthoscope.geometry.arrays import CalibrationError, Float, Int, ndarray
 from orthoscope.geometry.pose import Pose, nearest_rotation
-from orthoscope.models.target_shape import polynomials
-from orthoscope.targets.detections import Target, View
+from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import TargetShape, polynomials
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target
 
-__all__ = ["Turn", "in_one_order", "turns_of"]
+__all__ = ["Turn", "in_one_order", "listed_as_known", "turns_of"]
 
 FEWEST = 3  # views: of two, either may be the one that is turned
 LIKELY = 1e-3  # of the target's size: the standard deviation of a smooth shape's coefficients
@@ -97,6 +100,34 @@ def in_one_order(flat: Calibration) -> Calibration:
         outliers.append(outlier._replace(id=int(corners[outlier.id])))
     detections = replace(flat.detections, views=tuple(views), outliers=tuple(outliers))
     return replace(flat, detections=detections, camera_from_target=tuple(poses))
+
+
+def listed_as_known(camera: Camera, detections: Detections, shape: TargetShape | None) -> Detections:
+    """The detections, corners listed from the end of the target that a known shape was learnt from: of each
+    view the turn with which it is seen best. Rows keep their order; a view that some turn cannot be fitted
+    for is left as it is.
+
+    Args:
+        camera: that took them.
+        shape: of the target.
+    """
+    turns = turns_of(detections.target)
+    if len(turns) < 2 or shape is None or not shape.displacements.any():
+        return detections
+    views = []
+    for view in detections.views:
+        listed = [replace(view, ids=turn.corners[view.ids]) for turn in turns]
+        views.append(min(listed, key=lambda one: _misses(camera, replace(detections, views=(one,)), shape)))
+    return replace(detections, views=tuple(views))
+
+
+def _misses(camera: Camera, alone: Detections, shape: TargetShape) -> float:
+    """The sum of squared residuals of one view; infinite where it has no pose."""
+    try:
+        poses = resect(camera, alone, shape=shape)
+    except CalibrationError:
+        return np.inf
+    return float((residuals_of(camera, poses, alone, shape=shape)[0] ** 2).sum())
 
 
 @dataclass(frozen=True, eq=False)
