@@ -79,7 +79,8 @@ def evaluate(
         )
         return
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
-        board = target or loaded.detections.target  # type: ignore[union-attr]  # a calibration, as checked above
+        # type: ignore[union-attr]  # a calibration, as checked above
+        board = target or loaded.detections.target
         detections, _ = detections_from(
             others, board, image_size=image_size, executor=executor, progress=progress
         )
