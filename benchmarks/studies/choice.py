@@ -170,14 +170,10 @@ if __name__ == "__main__":
             ratios[rule].append(choose(entries, corners).true / best)
         taken = RULES["base first, then the richest unless worse"](entries, corners)
         honest.append(taken.predicted / taken.true)
-        print(
-            f"{seed:3d} {name:12s} {case:8s} {len(photographs.views):2d} views  {taken.model.base} {taken.true:.3f} px",
-            flush=True,
-        )
+        told = f"{seed:3d} {name:12s} {case:8s} {len(photographs.views):2d} views"
+        print(f"{told}  {taken.model.base} {taken.true:.3f} px", flush=True)
     for rule, found in ratios.items():
-        print(
-            f"{rule:45s} {np.exp(np.mean(np.log(found))):.2f}, nine of ten below {np.percentile(found, 90):.1f}"
-        )
-    print(
-        f"predicted over true {np.exp(np.mean(np.log(honest))):.2f}; true above twice that {np.mean(np.array(honest) < 0.5):.0%}"
-    )
+        mean, ninth = np.exp(np.mean(np.log(found))), np.percentile(found, 90)
+        print(f"{rule:45s} {mean:.2f}, nine of ten below {ninth:.1f}")
+    mean, beyond = np.exp(np.mean(np.log(honest))), np.mean(np.array(honest) < 0.5)
+    print(f"predicted over true {mean:.2f}; true above twice that {beyond:.0%}")

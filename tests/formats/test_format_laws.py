@@ -142,6 +142,16 @@ def test_a_file_cut_off_is_the_same_camera_or_an_input_error(tmp_path, tool):
         assert refused >= 3
 
 
+def test_a_name_with_a_blank_stands_in_colmaps_binary_file_only(tmp_path):
+    camera = Camera(SIZE, Intrinsics(400.0, 400.0, 320.0, 240.0), Brown(k1=0.01))
+    source = Contents(camera, {"a b.png": poses()["a.png"]})
+    with pytest.raises(InputError, match=r"'a b\.png' cannot stand in COLMAP's images\.txt"):
+        export(source, tmp_path / "cameras.txt", "colmap")
+    assert list(tmp_path.iterdir()) == []
+    export(source, tmp_path / "cameras.bin", "colmap")
+    assert list(load_contents(tmp_path / "cameras.bin").poses) == ["a b.png"]
+
+
 def test_a_file_of_no_tool_names_the_tools(tmp_path):
     (tmp_path / "notes.txt").write_text("nothing here\n")
     with pytest.raises(InputError, match=r"holds no camera that is known here; expected a file of .*COLMAP"):

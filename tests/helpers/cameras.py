@@ -49,9 +49,9 @@ def farthest_apart(camera: Camera, other: Camera) -> float:
 
 
 def poses() -> dict[str, Pose]:
-    """Poses of three photographs, one of whose names has a blank."""
+    """Poses of three photographs, one of them in a folder."""
     rng = np.random.default_rng(0)
     return {
         name: Pose(rotation_from_vector(rng.normal(size=3)), rng.normal(size=3))
-        for name in ("a.png", "b c.png", "sub/d.jpg")
+        for name in ("a.png", "b-c.png", "sub/d.jpg")
     }

@@ -13,7 +13,7 @@ from numpy import ndarray
 
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Formula, Lens
-from orthoscope.models.lenses import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
+from orthoscope.models.lenses import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational, Stereographic
 from orthoscope.models.spline import Displacement, Lattice
 
 __all__ = [
@@ -65,6 +65,7 @@ LENSES_TO_TRY: dict[str, Formula] = {
     "kannala_brandt mild": KannalaBrandt(k1=-0.02, k2=0.003),
     "kannala_brandt strong": KannalaBrandt(k1=0.1, k2=-0.03, k3=0.01, k4=-0.001),
     "kannala_brandt folding": KannalaBrandt(k1=-0.2, k2=0.02, k3=-0.01, k4=0.001),
+    "stereographic": Stereographic(),
 }
 
 

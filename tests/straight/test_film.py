@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import cv2
 import numpy as np
 import pytest
@@ -99,3 +101,65 @@ def test_a_film_of_another_size_is_refused_and_nothing_is_left_behind(film, tmp_
     with pytest.raises(InputError, match=r"160x120; this camera was calibrated at 640x480"):
         undistort_video(film, camera, tmp_path / "straight/film.mp4")
     assert list((tmp_path / "straight").iterdir()) == []
+
+
+@pytest.fixture
+def film_with_sound(tmp_path):
+    """Frames at uneven times, and a tone."""
+    av = pytest.importorskip("av", reason="PyAV writes films with sound; pip install 'orthoscope[video]'")
+    path = tmp_path / "sound.mp4"
+    with av.open(str(path), "w") as film:
+        seen, heard = film.add_stream("libx264", rate=25), film.add_stream("aac", rate=16000)
+        seen.width, seen.height = SIZE
+        seen.pix_fmt, seen.time_base = "yuv420p", Fraction(1, 1000)
+        seen.codec_context.time_base = Fraction(1, 1000)
+        for at, picture in zip(UNEVEN, FILMED, strict=False):
+            frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+            frame.pts, frame.time_base = at, Fraction(1, 1000)
+            film.mux(seen.encode(frame))
+        film.mux(seen.encode(None))
+        tone = np.sin(np.arange(16000) * 0.1).astype(np.float32)[None]
+        sound = av.AudioFrame.from_ndarray(tone, format="fltp", layout="mono")
+        sound.sample_rate, sound.pts = 16000, 0
+        film.mux(heard.encode(sound))
+        film.mux(heard.encode(None))
+    return path
+
+
+UNEVEN = (0, 40, 100, 110, 300, 340, 900)
+
+
+def times_and_sound(path) -> tuple[list[float], list[bytes], str]:
+    import av
+
+    with av.open(str(path)) as film:
+        codec = film.streams.video[0].codec_context.name
+        times = [float(frame.time) for frame in film.decode(video=0)]
+    with av.open(str(path)) as film:
+        sound = [bytes(packet) for packet in film.demux(audio=0) if packet.size]
+    return times, sound, codec
+
+
+def test_a_film_keeps_its_sound_and_the_times_of_its_frames(film_with_sound, tmp_path):
+    place = tmp_path / "straight/sound.mp4"
+    assert undistort_video(film_with_sound, CAMERA, place) == len(UNEVEN)
+    times, sound, codec = times_and_sound(place)
+    given_times, given_sound, _ = times_and_sound(film_with_sound)
+    assert times == pytest.approx(given_times, abs=2e-3)
+    assert times == pytest.approx([at / 1000 for at in UNEVEN], abs=2e-3)
+    assert sound == given_sound
+    assert codec == "h264"
+
+
+def test_without_pyav_opencv_writes_the_film(film_with_sound, tmp_path, monkeypatch):
+    monkeypatch.setattr("orthoscope.straight.film.has_pyav", lambda: False)
+    assert undistort_video(film_with_sound, CAMERA, tmp_path / "straight/sound.mp4") >= len(UNEVEN) - 1
+
+
+def test_a_film_is_not_written_onto_itself(film_with_sound, tmp_path):
+    before = film_with_sound.read_bytes()
+    (tmp_path / "link.mp4").symlink_to(film_with_sound)
+    for place in (film_with_sound, tmp_path / "link.mp4"):
+        with pytest.raises(InputError, match="what is read is never written onto"):
+            undistort_video(film_with_sound, CAMERA, place)
+    assert film_with_sound.read_bytes() == before

@@ -16,11 +16,13 @@ from orthoscope.cli.compare import compare
 from orthoscope.cli.demo import demo
 from orthoscope.cli.detect import detect
 from orthoscope.cli.evaluate import evaluate
+from orthoscope.cli.executors import single_threaded
 from orthoscope.cli.export import convert, export, tools
 from orthoscope.cli.given_files import keeping_inputs
 from orthoscope.cli.paper import paper
 from orthoscope.cli.report import report
 from orthoscope.cli.simulate import simulate
+from orthoscope.cli.target import target
 from orthoscope.cli.undistort import undistort
 from orthoscope.version import __version__
 
@@ -51,6 +53,7 @@ for verb in (
     tools,
     report,
     simulate,
+    target,
     demo,
     paper,
 ):
@@ -60,9 +63,10 @@ for verb in (
 
 
 def main() -> None:
-    """Run the command line; errors become one message and an exit code."""
+    """Run the command line, BLAS with one thread; errors become one message and an exit code."""
     try:
-        verbs(standalone_mode=False)
+        with single_threaded():
+            verbs(standalone_mode=False)
     except click.exceptions.Exit as leave:
         sys.exit(leave.exit_code)
     except (click.Abort, KeyboardInterrupt):

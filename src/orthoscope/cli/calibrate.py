@@ -45,6 +45,12 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @options.loss
 @options.image_size
 @options.folds
+@click.option(
+    "--without",
+    multiple=True,
+    metavar="NAME",
+    help="Leave this photograph out, once for each; detections.json keeps it.",
+)
 @options.jobs
 @options.cluster
 @click.option(
@@ -66,6 +72,7 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
 @options.keep
 @click.option("--report/--no-report", default=True, help="Whether to write OUT/report.html.")
+@options.verbose
 @options.as_json
 def calibrate(photos: tuple[str, ...], **settings: Any) -> None:
     """Calibrate a camera from photographs of a flat target."""
@@ -86,12 +93,14 @@ def calibrate_into(
     loss: str | None = None,
     image_size: tuple[int, int] | None = None,
     folds: int = 5,
+    without: tuple[str, ...] = (),
     jobs: int | None = None,
     cluster: str | None = None,
     export: str | None = None,
     undistort: bool = False,
     keep: str = "all",
     report: bool = True,
+    verbose: bool = False,
     as_json: bool = False,
 ) -> Any:
     """The main job; prints the summary and returns the evaluation."""
@@ -105,6 +114,7 @@ def calibrate_into(
     from orthoscope.formats.own.json import save, text_of
     from orthoscope.methods import calibrate as run
     from orthoscope.methods import settings_of
+    from orthoscope.targets.left_out import left_out
 
     check_folder(out)
     lenses = _lenses_of(export)
@@ -125,6 +135,7 @@ def calibrate_into(
         )
     save(detections, out / "detections.json")
     written = [out / "detections.json"]
+    detections = left_out(detections, without) if without else detections
     with bar("calibrating") as progress:
         told = {"judging": progress} if "judging" in settings_of(method) else {}
         calibration = run(detections, method=method, **given, **told)
@@ -136,13 +147,17 @@ def calibrate_into(
     if export:
         written += _write_for(export, calibration, out)
     if report:
-        written.append(_write_report(evaluation, files, out, keep=keep))
+        written.append(_write_report(evaluation, files, out, keep=keep, jobs=jobs))
     if undistort:
         written.append(_write_straight(evaluation, files, out, keep=keep, jobs=jobs, cluster=cluster))
     if as_json:
         click.echo(text_of(evaluation), nl=False)
     else:
-        click.echo("\n".join([*evaluation_lines(evaluation), "wrote      " + ", ".join(map(str, written))]))
+        click.echo(
+            "\n".join(
+                [*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written))]
+            )
+        )
     return evaluation
 
 
@@ -166,23 +181,25 @@ def _write_for(tool: str, calibration: Any, out: Path) -> list[Path]:
     return list(exported.files)
 
 
-def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str) -> Path:
+def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None) -> Path:
+    from orthoscope.cli.executors import threads
+    from orthoscope.cli.progress import bar
     from orthoscope.report.page import write_report
-    from orthoscope.straight.undistort import before_and_after
+    from orthoscope.report.pictures import pictures_of
 
-    write_report(
-        evaluation, out / "report.html", photograph=before_and_after(evaluation.calibration, files, keep=keep)
-    )
+    with threads(jobs) as executor, bar("report") as progress:
+        pictures = pictures_of(evaluation.calibration, files, keep=keep, executor=executor, progress=progress)
+    write_report(evaluation, out / "report.html", pictures=pictures)
     return out / "report.html"
 
 
 def _write_straight(
     evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None
 ) -> Path:
-    from orthoscope.cli.undistort import straighten
-    from orthoscope.formats.own.json import save
+    from orthoscope.cli.undistort import straighten, write_beside
     from orthoscope.geometry.arrays import InputError
-    from orthoscope.straight.undistort import straight_camera
+    from orthoscope.straight.outputs import replace_outputs
+    from orthoscope.straight.views import straight_camera
 
     if not files:
         raise InputError(
@@ -191,6 +208,10 @@ def _write_straight(
         )
     calibration = evaluation.calibration
     paths = [files[view.image] for view in calibration.detections.views]
-    straighten(paths, calibration.camera, out / "undistorted", keep=keep, jobs=jobs, cluster=cluster)
-    save(straight_camera(calibration.camera, keep=keep), out / "undistorted/camera.json")
+    view = straight_camera(calibration.camera, keep=keep)
+    written, _ = straighten(
+        paths, calibration.camera, out / "undistorted", view=view, jobs=jobs, cluster=cluster
+    )
+    beside = write_beside(calibration.camera, view, out / "undistorted", maps=False)
+    replace_outputs(out / "undistorted", [*written, *beside], paths)
     return out / "undistorted"

@@ -32,6 +32,7 @@ __all__ = [
     "skew",
     "target",
     "tool_settings",
+    "verbose",
 ]
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -143,7 +144,8 @@ target: Decorator = click.option(
     metavar="SPEC",
     help=(
         "What was photographed: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g."
-        " chessboard:9x6:25mm."
+        " chessboard:9x6:25mm; charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:legacy], counting squares;"
+        " aprilgrid:COLUMNSxROWS:TAG:SPACING, counting tags; or a target.yaml of Kalibr."
     ),
 )
 image_size: Decorator = click.option(
@@ -246,4 +248,7 @@ as_json: Decorator = click.option(
 )
 calibration_file: Decorator = click.argument(
     "calibration", type=click.Path(path_type=Path), metavar="CALIBRATION.json"
+)
+verbose: Decorator = click.option(
+    "-v", "--verbose", is_flag=True, help="Print every figure that was found, and what was left out."
 )

@@ -17,10 +17,13 @@ Examples:
   wrote      14 pictures into straight/, and straight/camera.json, their camera
   $ orthoscope undistort camera/calibration.json clip.mp4 -o straight/
   wrote      straight/clip.mp4, 250 frames, and straight/camera.json, its camera
+  $ orthoscope undistort fisheye.yaml photos/ -o round/ --projection equidistant --size 1200x1200
 
 \b
-PHOTOS are files, folders and globs of photographs; and video files (mp4, m4v, mov, mkv, avi), each named by
-itself. Sound is not kept.
+CAMERA is ours or any tool's (`orthoscope tools`). PHOTOS are files, folders and globs of photographs; and
+video files (mp4, m4v, mov, mkv, avi), each named by itself. Photographs keep their depth, channels, EXIF,
+profile and file type; films their sound and time stamps where PyAV is installed
+(pip install 'orthoscope[video]').
 """
 
 
@@ -36,6 +39,23 @@ itself. Sound is not kept.
     help="Folder to write.",
 )
 @options.keep
+@click.option("--size", type=options.SIZE, help="Of the straight pictures; by default the camera's.")
+@click.option("--fov", type=float, help="Degrees that a straight picture shows across; instead of --keep.")
+@click.option(
+    "--scale",
+    type=float,
+    help="Straight pixels for one of the camera's at its principal point; instead of --keep.",
+)
+@click.option(
+    "--projection",
+    default="rectilinear",
+    show_default=True,
+    metavar="NAME",
+    help="rectilinear, or for wide lenses equidistant, stereographic, cylindrical or equirectangular.",
+)
+@click.option(
+    "--maps", is_flag=True, help="Also write where each straight pixel looks: OUT/map_x.npy and map_y.npy."
+)
 @options.jobs
 @options.cluster
 @options.as_json
@@ -44,6 +64,11 @@ def undistort(
     photos: tuple[str, ...],
     out: Path,
     keep: str,
+    size: tuple[int, int] | None,
+    fov: float | None,
+    scale: float | None,
+    projection: str,
+    maps: bool,
     jobs: int | None,
     cluster: str | None,
     as_json: bool,
@@ -51,58 +76,93 @@ def undistort(
     """Take the lens out of photographs and films: straight lines come out straight."""
     from orthoscope.cli.summary import camera_numbers, to_json
     from orthoscope.files.images import photographs
-    from orthoscope.files.whole_files import check_folder
+    from orthoscope.files.whole_files import check_folder, check_not_onto
     from orthoscope.formats.load import load_camera
-    from orthoscope.formats.own.json import save
+    from orthoscope.models.camera import Camera
     from orthoscope.straight.film import is_video
-    from orthoscope.straight.undistort import straight_camera
+    from orthoscope.straight.outputs import replace_outputs
+    from orthoscope.straight.views import share_kept, straight_camera
 
     loaded = load_camera(camera)
+    view = straight_camera(loaded, keep=keep, size=size, fov=fov, scale=scale, projection=projection)
     films = list(dict.fromkeys(Path(path) for path in photos if is_video(path)))
     pictures = [path for path in photos if not is_video(path)]
     paths = photographs(pictures) if pictures or not films else []
     check_folder(out)
-    frames = straighten_films(films, loaded, out, keep=keep, jobs=jobs)
+    check_not_onto([out / path.name for path in (*films, *paths)], [*films, *paths])
+    frames = straighten_films(films, loaded, out, view=view, jobs=jobs)
     written, failed = (
-        straighten(paths, loaded, out, keep=keep, jobs=jobs, cluster=cluster) if paths else ([], [])
+        straighten(paths, loaded, out, view=view, jobs=jobs, cluster=cluster) if paths else ([], [])
     )
-    straight = straight_camera(loaded, keep=keep)
-    save(straight, out / "camera.json")
+    beside = write_beside(loaded, view, out, maps=maps)
+    gone = replace_outputs(out, [*frames, *written, *beside], [*films, *paths])
     if as_json:
         rejected = [{"name": name, "reason": reason} for name, reason in failed]
         made = [str(path) for path in (*frames, *written)]
-        click.echo(to_json({"written": made, "rejected": rejected, "camera": camera_numbers(straight)}))
+        numbers = camera_numbers(view) if isinstance(view, Camera) else None
+        removed = [str(path) for path in gone]
+        click.echo(to_json({"written": made, "rejected": rejected, "removed": removed, "camera": numbers}))
         return
+    if gone:
+        click.echo(f"removed    {len(gone)} files of an earlier run that this one does not write", err=True)
+    if (share := share_kept(loaded, view)) < 1.0 and keep == "all":
+        click.echo(f"shows      {100 * share:.3g} % of what was photographed ({projection})", err=True)
     made = [f"{film}, {count} frames" for film, count in frames.items()]
     made += [f"{len(written)} pictures into {out}/"] if written else []
-    click.echo(f"wrote      {'; '.join(made)}, and {out / 'camera.json'}, their camera")
+    click.echo(f"wrote      {'; '.join(made)}" + (f", and {beside[0]}, their camera" if beside else ""))
+
+
+def write_beside(camera: Any, view: Any, out: Path, *, maps: bool) -> list[Path]:
+    """Write the straight pictures' camera, where it is one that files can hold, and the maps that were asked for."""
+    import io
+
+    import numpy as np
+
+    from orthoscope.files.whole_files import write_bytes
+    from orthoscope.formats.own.json import save
+    from orthoscope.models.camera import Camera
+    from orthoscope.straight.views import map_of
+
+    written = []
+    if isinstance(view, Camera):
+        save(view, out / "camera.json")
+        written.append(out / "camera.json")
+    if maps:
+        for name, values in zip(("map_x.npy", "map_y.npy"), map_of(camera, view), strict=True):
+            np.save(content := io.BytesIO(), values)
+            write_bytes(out / name, content.getvalue())
+            written.append(out / name)
+    return written
 
 
 def straighten_films(
-    paths: list[Path], camera: Any, out: Path, *, keep: str, jobs: int | None
+    paths: list[Path], camera: Any, out: Path, *, view: Any, jobs: int | None
 ) -> dict[Path, int]:
     """Write straight films, one after the other; returns for each its number of frames."""
     from orthoscope.cli.executors import threads
     from orthoscope.cli.progress import bar
     from orthoscope.geometry.arrays import InputError
     from orthoscope.straight.film import undistort_video
+    from orthoscope.straight.film_av import has_pyav
 
     places = {out / path.name: path for path in paths}
     if len(places) < len(paths):
         raise InputError(
             "two films have the same name; straighten them into folders of their own, one after the other."
         )
+    if paths and not has_pyav():
+        click.echo("films      are written without sound; pip install 'orthoscope[video]' keeps it", err=True)
     frames = {}
     for place, path in places.items():
         with threads(jobs) as executor, bar("straightening") as progress:
             frames[place] = undistort_video(
-                path, camera, place, keep=keep, executor=executor, progress=progress
+                path, camera, place, view=view, executor=executor, progress=progress
             )
     return frames
 
 
 def straighten(
-    paths: list[Path], camera: Any, out: Path, *, keep: str, jobs: int | None, cluster: str | None
+    paths: list[Path], camera: Any, out: Path, *, view: Any, jobs: int | None, cluster: str | None
 ) -> tuple[list[Path], list[tuple[str, str]]]:
     """Write straight pictures; photographs that cannot be used are named on stderr."""
     from orthoscope.cli.executors import threads
@@ -114,7 +174,7 @@ def straighten(
         paths, out = [path.absolute() for path in paths], out.absolute()
     with bar("straightening") as progress, threads(jobs, cluster) as executor:
         written, failed = undistort_photographs(
-            paths, camera, out, keep=keep, executor=executor, progress=progress
+            paths, camera, out, view=view, executor=executor, progress=progress
         )
     for name, reason in failed:
         click.echo(f"left out   {name}: {reason}", err=True)

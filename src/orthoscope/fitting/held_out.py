@@ -17,6 +17,7 @@ from orthoscope.fitting.board_order import listed_as_known
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, Int, ndarray
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
@@ -94,6 +95,7 @@ def folds_of_views(views: int, folds: int, *, seed: int = 0) -> list[ndarray]:
     ]
 
 
+@with_one_thread
 def held_out(
     detections: Detections,
     refit: Refit,
@@ -127,6 +129,7 @@ def held_out(
     return HeldOut(tuple(cameras), tuple(shapes), tuple(poses), tuple(residuals))
 
 
+@with_one_thread
 def _fold(
     detections: Detections, refit: Refit, part: Int[ndarray, " f"]
 ) -> tuple[Calibration, tuple[Pose, ...], tuple[ndarray, ...]] | None:

@@ -17,6 +17,7 @@ import numpy as np
 from orthoscope.files.whole_files import read_bytes
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import LARGEST_SIDE, Document, numbers, whole_number
+from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, quaternion_from_rotation, rotation_from_quaternion
 from orthoscope.models.camera import Camera, Intrinsics
 
@@ -128,7 +129,7 @@ def _text_images(document: Document) -> list[tuple[list[Any], str, str]]:
     lines = [line for line in (document.text or "").split("\n") if not line.startswith("#")]
     rows = []
     for line in lines[::2]:
-        words = line.split(maxsplit=9)
+        words = line.split()
         if not words:
             continue
         if len(words) < 10:
@@ -186,6 +187,11 @@ def _camera_bytes(camera: Camera, model: str, values: list[float]) -> bytes:
 def _image_text(poses: Mapping[str, Pose]) -> str:
     lines = ["# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME", "# POINTS2D[]: none"]
     for i, (image, pose) in enumerate(poses.items(), 1):
+        if image.split() != [image]:
+            raise InputError(
+                f"image name {image!r} cannot stand in COLMAP's images.txt, which ends at the first blank."
+                " Write cameras.bin, or rename the photograph."
+            )
         values = [*quaternion_from_rotation(pose.rotation).tolist(), *pose.translation.tolist()]
         lines += [f"{i} {' '.join(map(repr, values))} 1 {image}", ""]
     return "\n".join(lines) + "\n"

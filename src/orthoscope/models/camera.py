@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.models.chunks import in_blocks
+from orthoscope.models.decentred_lenses import Brown
 from orthoscope.models.lens import Lens
 from orthoscope.models.opencv_order import opencv_distortion
 from orthoscope.models.parameters import Parameters
@@ -24,6 +25,12 @@ from orthoscope.models.smooth_map import smooth_map
 
 __all__ = ["LARGEST_SIDE", "WIDEST", "Camera", "Intrinsics", "image_border"]
 
+# The lens of a camera without any.
+PIN_HOLE = Brown()
+# A straight view of `valid` places keeps this far inside the photograph, pixels: an interpolation rounds.
+EDGE = 1e-3
+# Halvings by which the scale of such a view is found, and the share by which another middle must be better.
+BISECTIONS, STEP_GAIN = 14, 1e-3
 # No image has a side of more pixels; a file that says so is damaged.
 LARGEST_SIDE = 1_000_000
 WIDEST = np.deg2rad(75.0)  # rays farther from the axis than this a pin-hole stretches without end
@@ -288,6 +295,24 @@ class Camera:
         """
         return self.project(_in_front((straight or self.intrinsics).to_plane(pixels)))
 
+    def view_map(self, view: Camera) -> tuple[Float[ndarray, "h w"], Float[ndarray, "h w"]]:
+        """For each pixel of another camera at the same place, where to look in this one's photograph.
+
+        Args:
+            view: the other camera, such as one of a straight picture; its lens may be any.
+        Returns:
+            x and y, float32 as cv2.remap takes them; NaN where a ray lies beyond either lens's domain or its
+            image outside the photograph by more than a pixel.
+        """
+        if isinstance(view.lens, type(PIN_HOLE)) and not view.lens.coefficients.any() and not view.lens_frame:
+            return self.undistort_map(view.intrinsics, view.image_size)
+        return smooth_map(
+            lambda pixels: self.project(view.unproject(pixels)),
+            view.image_size,
+            vouched=lambda pixels: np.zeros(len(pixels), dtype=bool),
+            limits=self.image_size,
+        )
+
     def undistort_map(
         self, straight: Intrinsics | None = None, size: tuple[int, int] | None = None
     ) -> tuple[Float[ndarray, "h w"], Float[ndarray, "h w"]]:
@@ -310,28 +335,84 @@ class Camera:
             limits=self.image_size,
         )
 
-    def straight_intrinsics(self, keep: str = "all", widest: float = WIDEST) -> Intrinsics:
-        """A pin-hole for the straight image, same size: `all` keeps every photographed pixel, `valid` only
-        places that were photographed.
+    def straight_intrinsics(
+        self, keep: str = "all", widest: float = WIDEST, size: tuple[int, int] | None = None
+    ) -> Intrinsics:
+        """A pin-hole for the straight image, with this camera's aspect, so that squares stay squares.
 
-        widest: no ray farther than this from the axis (radians) is kept, since a pin-hole stretches it
-        without end. Raises InputError for another word. The paper: section 4.2, Fig. 7.
+        Args:
+            keep: `all` keeps every photographed pixel, `valid` only places that were photographed.
+            widest: no ray farther than this from the axis (radians) is kept, since a pin-hole stretches it
+                without end.
+            size: (width, height) of the straight image; by default this camera's.
+        Raises:
+            InputError: another word.
+        Source:
+            The paper, section 4.2, Fig. 7.
         """
         if keep not in ("all", "valid"):
             raise InputError(
                 f"keep is {keep!r}; expected 'all' (every photographed pixel) or 'valid' (no black border)."
             )
-        border = image_border(self.image_size)
+        reach = np.array(size or self.image_size) - 1.0
+        aspect = np.array([self.intrinsics.fx, self.intrinsics.fy])
         centre = np.array([[self.intrinsics.cx, self.intrinsics.cy]])
-        rays = self._border_rays(border, centre, widest)
-        plane = rays[:, :2] / rays[:, 2:]
-        width, height = self.image_size
-        if keep == "all":
-            low, high = plane.min(0), plane.max(0)
-        else:
-            low, high = _inner_rectangle(plane, width / height)
-        focal = np.array([width - 1.0, height - 1.0]) / (high - low)
-        return Intrinsics(focal[0], focal[1], -focal[0] * low[0], -focal[1] * low[1])
+        rays = self._border_rays(image_border(self.image_size), centre, widest)
+        plane = rays[:, :2] / rays[:, 2:] * aspect
+        low, high = plane.min(0), plane.max(0)
+        middle, scale = 0.5 * (low + high), float((reach / (high - low)).min())
+        if keep == "valid":
+            middle, scale = self._inner_view(middle, scale, size or self.image_size, np.tan(widest))
+        (fx, fy), (cx, cy) = scale * aspect, 0.5 * reach - scale * middle
+        return Intrinsics(float(fx), float(fy), float(cx), float(cy))
+
+    def _inner_view(
+        self, middle: ndarray, scale: float, size: tuple[int, int], farthest: float
+    ) -> tuple[ndarray, float]:
+        """Middle and scale of the largest straight view that shows nothing but what was photographed.
+
+        Args:
+            middle: in pixels of this camera's own pin-hole, from its principal point; where to start.
+            scale: at which more than what was photographed is shown.
+            size: (width, height) of the view.
+            farthest: tangent of the largest angle from the axis.
+        """
+        aspect = np.array([self.intrinsics.fx, self.intrinsics.fy])
+        reach, limits = np.array(size) - 1.0, np.array(self.image_size) - 1.0
+
+        def fits(middle: ndarray, scale: float, pixels: ndarray) -> bool:
+            plane = ((pixels - 0.5 * reach) / scale + middle) / aspect
+            if (plane * plane).sum(1).max() > farthest * farthest:
+                return False
+            seen = self.project(_in_front(plane))
+            return bool(((seen >= EDGE) & (seen <= limits - EDGE)).all())  # NaN fits nowhere
+
+        def least(middle: ndarray, low: float, high: float, pixels: ndarray) -> float:
+            for _ in range(BISECTIONS):
+                if fits(middle, between := np.sqrt(low * high), pixels):
+                    high = between
+                else:
+                    low = between
+            return float(high)
+
+        few, every = image_border(size), image_border(size, max(size))
+        start = min(scale, 1.0)
+        largest = next((start * 2.0**i for i in range(1, 16) if fits(middle, start * 2.0**i, few)), None)
+        if largest is None:  # the middle itself was not photographed: the principal point is the better one
+            middle = np.zeros(2)
+            largest = next((start * 2.0**i for i in range(1, 24) if fits(middle, start * 2.0**i, few)), None)
+        if largest is None:
+            raise InputError("no part of the image can be shown straight. Use keep='all'.")
+        scale = least(middle, 0.5 * start, largest, few)
+        for step in (0.08, 0.04, 0.02, 0.01):
+            for side in (*np.diag(reach), *-np.diag(reach)):
+                moved = middle + step * side / scale
+                while fits(moved, scale * (1.0 - STEP_GAIN), few):
+                    middle, scale = moved, least(moved, 0.5 * scale, scale * (1.0 - STEP_GAIN), few)
+                    moved = middle + step * side / scale
+        while not fits(middle, scale, every):
+            scale *= 1.0 + STEP_GAIN
+        return middle, scale
 
     def _lens_rays(self, points: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
         """Points of the camera frame as the lens meets them: turned about its own distortion centre where it
@@ -386,15 +467,3 @@ def _numbers(values: ArrayLike, name: str) -> ndarray:
 def _in_front(plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
     """Points at depth 1."""
     return np.concatenate([plane, np.ones((len(plane), 1))], axis=-1)
-
-
-def _inner_rectangle(plane: ndarray, aspect: float) -> tuple[ndarray, ndarray]:
-    """A large upright rectangle of the given aspect inside the closed curve `plane`, grown from the curve's
-    middle.
-    """
-    middle = 0.5 * (plane.min(0) + plane.max(0))
-    side = plane - middle
-    # the curve meets the rectangle's boundary where max(|x| / aspect, |y|) is least
-    half = np.maximum(np.abs(side[:, 0]) / aspect, np.abs(side[:, 1])).min()
-    reach = np.array([half * aspect, half])
-    return middle - reach, middle + reach

@@ -338,7 +338,7 @@ class Formula(Lens):
         return replace(self, **{name: float(value) for name, value in values.items()})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RadialLens(Formula):
     """A lens that is nothing but its curve: a subclass says `gain` and `gain_by`, the rest is here."""
 

@@ -9,7 +9,7 @@ from orthoscope.geometry.arrays import InputError
 from orthoscope.models.decentred_lenses import Brown, Rational
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Formula, Lens
-from orthoscope.models.radial_lenses import Division, Fet, Fov, KannalaBrandt, Pfet
+from orthoscope.models.radial_lenses import Division, Fet, Fov, KannalaBrandt, Pfet, Stereographic
 
 __all__ = [
     "FREE",
@@ -21,6 +21,7 @@ __all__ = [
     "KannalaBrandt",
     "Pfet",
     "Rational",
+    "Stereographic",
     "lens_name",
     "lens_with_values",
     "parse_lens",
@@ -36,6 +37,7 @@ LENSES: dict[str, type[Formula]] = {
     "fov": Fov,
     "division": Division,
     "kannala_brandt": KannalaBrandt,
+    "stereographic": Stereographic,
 }
 
 

@@ -9,6 +9,7 @@ division          A. Fitzgibbon, Simultaneous linear estimation of multiple view
 CVPR 2001.
 kannala_brandt    J. Kannala and S. Brandt, A generic camera model and calibration method, TPAMI 28(8), 2006;
                   OpenCV's fisheye, Kalibr's equidistant.
+stereographic     mrcal's; J. P. Snyder, Map Projections: A Working Manual, USGS 1395, 1987.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.charts import EQUIDISTANT, GNOMONIC
 from orthoscope.models.lens import RadialLens
 
-__all__ = ["Division", "Fet", "Fov", "KannalaBrandt", "Pfet"]
+__all__ = ["Division", "Fet", "Fov", "KannalaBrandt", "Pfet", "Stereographic"]
+
+# theta^2 up to which a series is exact to rounding where a closed form loses its digits.
+SERIES_TO = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -152,6 +156,29 @@ class KannalaBrandt(RadialLens):
 
     def gain_by(self, name, u, g):
         return prod([u] * int(name[1]), start=np.ones_like(u))  # many times faster than a power
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stereographic(RadialLens):
+    """r_d = 2 tan(theta / 2): small shapes keep their shape; no coefficients."""
+
+    chart = EQUIDISTANT
+    free: ClassVar[tuple[str, ...]] = ()
+
+    def gain(self, u):
+        small = u < SERIES_TO
+        safe = np.where(small, 1.0, u)
+        s = np.sqrt(safe)
+        t = np.tan(0.5 * s)
+        series = 1.0 + u * (1 / 12 + u * (1 / 120 + u * 17 / 20160))
+        slope = 1 / 6 + u * (1 / 30 + u * 17 / 3360)
+        return (
+            np.where(small, series, 2.0 * t / s),
+            np.where(small, slope, ((1.0 + t * t) * s - 2.0 * t) / (safe * s)),
+        )
+
+    def gain_by(self, name, u, g):
+        raise AssertionError(f"a stereographic lens has no coefficient {name}")
 
 
 def _over(above: ndarray, below: ndarray) -> ndarray:

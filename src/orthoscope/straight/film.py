@@ -2,7 +2,8 @@
 
 Frames are read and written here, in order, and mapped by an executor meanwhile, a few ahead, so that the
 cores are busy and memory does not grow with the film. A film is written beside its place and takes it when it
-is whole. Sound is not kept: OpenCV does not read it.
+is whole. Where PyAV is installed it is H.264 with its sound and its time stamps (film_av.py); otherwise
+OpenCV writes it, without sound, which OpenCV does not read.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from pathlib import Path
 
 import cv2
 
+from orthoscope.files.whole_files import check_not_onto
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.models.camera import Camera
+from orthoscope.straight.film_av import has_pyav, straighten_film
 from orthoscope.straight.undistort import Straightener
+from orthoscope.straight.views import View
 
 __all__ = ["CODECS", "is_video", "undistort_video"]
 
@@ -45,17 +49,27 @@ def undistort_video(
     place: str | PathLike[str],
     *,
     keep: str = "all",
+    view: View | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> int:
-    """The straight film of a video file, written to `place`, whose suffix says in which format; returns the
-    number of frames.
+    """The straight film of a video file, written to `place`, whose suffix says in which format.
 
-    keep: `all` or `valid`, as for photographs. executor: threads that map frames; by default as many as there
-    are cores. progress: called with (frames done, frames that the file speaks of, name). Raises InputError
-    where the file cannot be read, is of another size than the camera's, or the place cannot be written.
+    Args:
+        keep, view: as for photographs.
+        executor: threads that map frames; by default as many as there are cores.
+        progress: called with (frames done, frames that the file speaks of, name).
+    Returns:
+        The number of frames.
+    Raises:
+        InputError: the file cannot be read, is of another size than the camera's, or is what would be written
+            onto; the place cannot be written.
     """
-    straightener, path, place = Straightener(camera, keep=keep), Path(path), Path(place)
+    path, place = Path(path), Path(place)
+    check_not_onto([place], [path])
+    straightener = Straightener(camera, keep=keep, view=view)
+    if has_pyav():
+        return _with_pyav(straightener, path, place, executor=executor, progress=progress)
     with nullcontext(executor) if executor else ThreadPoolExecutor() as run, _Source(path) as source:
         rate, total = source.get(cv2.CAP_PROP_FPS), int(source.get(cv2.CAP_PROP_FRAME_COUNT))
         with _Film(place, rate if 0 < rate < 1e4 else USUAL_RATE, straightener) as film:
@@ -69,6 +83,50 @@ def undistort_video(
                     f"{path} has no frame that can be read; expected a film. Copy it again or convert it."
                 )
     return done
+
+
+def _with_pyav(
+    straightener: Straightener,
+    path: Path,
+    place: Path,
+    *,
+    executor: Executor | None,
+    progress: Callable[[int, int, str], None] | None,
+) -> int:
+    if not path.is_file():
+        raise InputError(f"{path} does not exist; expected a video file. Check the name and the folder.")
+    part = _part_of(place)
+    size = straightener.view.image_size
+    try:
+        with nullcontext(executor) if executor else ThreadPoolExecutor() as run:
+            done = straighten_film(path, part, straightener, size=size, executor=run, progress=progress)
+        if not done:
+            raise InputError(
+                f"{path} has no frame that can be read; expected a film. Copy it again or convert it."
+            )
+        os.replace(part, place)
+    finally:
+        part.unlink(missing_ok=True)
+    return done
+
+
+def _part_of(place: Path) -> Path:
+    """Where a film is written until it is whole; makes its folder.
+
+    Raises InputError where the name is no film's or the folder cannot be made.
+    """
+    suffix = place.suffix.lower()
+    if suffix not in CODECS:
+        raise InputError(
+            f"{place} cannot be written: {suffix or 'no suffix'} is no film; expected one of"
+            f" {', '.join(CODECS)}."
+        )
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{place} cannot be written ({reason}); choose another place.") from error
+    return place.with_name(f".{place.stem}.{os.getpid()}.part{suffix}")
 
 
 def _in_order(
@@ -116,6 +174,7 @@ class _Film:
     """A film that is open for writing within a block, and at its place after it, unless the block failed."""
 
     def __init__(self, place: Path, rate: float, straightener: Straightener) -> None:
+<<<<<<< HEAD
         suffix = place.suffix.lower()
         if suffix not in CODECS:
             raise InputError(
@@ -132,6 +191,11 @@ class _Film:
         # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
         code = cv2.VideoWriter_fourcc(*CODECS[suffix])
         self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.camera.image_size)
+=======
+        self.place, self.part = place, _part_of(place)
+        code = cv2.VideoWriter_fourcc(*CODECS[place.suffix.lower()])  # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
+        self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.view.image_size)
+>>>>>>> main
 
     def __enter__(self) -> cv2.VideoWriter:
         if not self.film.isOpened():

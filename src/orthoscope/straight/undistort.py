@@ -1,6 +1,7 @@
-"""Straight pictures: photographs as a pin-hole camera would have taken them.
+"""Straight pictures: photographs as a pin-hole camera, or another that one chooses, would have taken them.
 
-The map says for each straight pixel where to look in the photograph (Camera.undistort_map); cv2.remap looks.
+The map says for each straight pixel where to look in the photograph (Camera.view_map); cv2.remap looks. A
+picture keeps its depth, its channels and all that stands beside its pixels in the file (picture_files.py).
 Where the lens has no image the map is NaN and the picture black. Colour is mapped with a fourth channel
 beside its three: the pixels are the same, and OpenCV 5 takes two thirds of the time for them. What lies
 between is written to the same memory for each photograph: fresh memory for large pictures costs the system as
@@ -20,13 +21,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from orthoscope.files.images import read_image, write_image
+from orthoscope.files.images import read_image
+from orthoscope.files.whole_files import check_not_onto, write_bytes
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.straight.picture_files import encoded, read_picture
+from orthoscope.straight.views import View, map_of, straight_camera
 
-__all__ = ["Straightener", "before_and_after", "straight_camera", "undistort", "undistort_photographs"]
+__all__ = ["Straightener", "before_and_after", "undistort", "undistort_photographs"]
 
 OUTSIDE = -10.0  # a place that is surely outside any photograph: remap paints it black
 
@@ -47,24 +50,26 @@ class _Spare(threading.local):
 class Straightener:
     """A camera's straight view, its map made once for many photographs.
 
-    keep: `all` photographed pixels, or only `valid` places (no black border). intrinsics: the pin-hole of the
-    straight pictures. To another process it goes without its map, which is made again there in less time than
-    it takes to send.
+    To another process it goes without its map, which is made again there in less time than it takes to send.
+
+    Args:
+        keep: `all` photographed pixels, or only `valid` places (no black border).
+        view: the camera of the straight pictures, instead of what `keep` says.
     """
 
-    def __init__(self, camera: Camera, *, keep: str = "all") -> None:
-        self.camera, self.keep = camera, keep
-        self.intrinsics: Intrinsics = camera.straight_intrinsics(keep)
+    def __init__(self, camera: Camera, *, keep: str = "all", view: View | None = None) -> None:
+        self.camera = camera
+        self.view: View = view or straight_camera(camera, keep=keep)
         self._spare = _Spare()
-        self._maps = [
-            np.nan_to_num(part, copy=False, nan=OUTSIDE) for part in camera.undistort_map(self.intrinsics)
+        self.maps: list[ndarray] = [
+            np.nan_to_num(part, copy=False, nan=OUTSIDE) for part in map_of(camera, self.view)
         ]
 
     def __reduce__(self) -> tuple[Callable[[Camera], Straightener], tuple[Camera]]:
-        return partial(Straightener, keep=self.keep), (self.camera,)
+        return partial(Straightener, view=self.view), (self.camera,)
 
     def __call__(self, image: ndarray, *, reuse: bool = False) -> ndarray:
-        """The straight picture of a photograph (h,w) or (h,w,c), any depth, same size.
+        """The straight picture of a photograph (h,w) or (h,w,c), any depth, of the view's size.
 
         reuse: where this thread's next picture may overwrite this one, whose memory then serves for all.
         Raises InputError where the photograph is not of the camera's size.
@@ -78,24 +83,30 @@ class Straightener:
             )
         if image.dtype != np.uint8 or image.shape[2:] != (3,):
             return self._mapped(image)
-        wide, mapped = (self._spare.picture(name, size, 4) for name in ("wide", "mapped"))
+        wide = self._spare.picture("wide", size, 4)
+        mapped = self._spare.picture("mapped", self.view.image_size, 4)
         cv2.cvtColor(image, cv2.COLOR_BGR2BGRA, dst=wide)
-        straight = self._spare.picture("straight", size, 3) if reuse else None
+        straight = self._spare.picture("straight", self.view.image_size, 3) if reuse else None
         return cv2.cvtColor(self._mapped(wide, into=mapped), cv2.COLOR_BGRA2BGR, dst=straight)
 
     def _mapped(self, image: ndarray, *, into: ndarray | None = None) -> ndarray:
         return cv2.remap(
-            image, *self._maps, interpolation=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, dst=into
+            image, *self.maps, interpolation=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, dst=into
         )
 
 
-def undistort(image: ndarray, camera: Camera, *, keep: str = "all") -> ndarray:
+def undistort(image: ndarray, camera: Camera, *, keep: str = "all", view: View | None = None) -> ndarray:
     """One straight picture; for many, a Straightener makes its map only once.
 
-    image: (h,w) or (h,w,c) of the camera's size.  keep: `all` or `valid`.
-    Raises InputError where the size differs.
+    Args:
+        image: (h,w) or (h,w,c) of the camera's size.
+        keep: `all` or `valid`.
+        view: the straight picture's camera, as `straight_camera` makes it; by default a pin-hole of the same
+            size.
+    Raises:
+        InputError: the size differs.
     """
-    return Straightener(camera, keep=keep)(image)
+    return Straightener(camera, keep=keep, view=view)(image)
 
 
 def undistort_photographs(
@@ -104,20 +115,28 @@ def undistort_photographs(
     folder: str | PathLike[str],
     *,
     keep: str = "all",
+    view: View | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> tuple[list[Path], list[tuple[str, str]]]:
-    """Straight pictures of photographs, written into a folder under their own names.
+    """Straight pictures of photographs, written into a folder under their own names, each as the file it was.
 
-    executor: where photographs are read, mapped and written, each by one worker from file to file (threads
-    suit; others need to see the same files), while OpenCV itself uses one thread in this process; by default
-    here. progress: called with (done, total, name). Returns the files written, and for each photograph that
-    could not be used its name and the reason.
+    Args:
+        keep, view: as for `undistort`.
+        executor: where photographs are read, mapped and written, each by one worker from file to file
+            (threads suit; others need to see the same files), while OpenCV itself uses one thread in this
+            process; by default here.
+        progress: called with (done, total, name).
+    Returns:
+        The files written, and for each photograph that could not be used its name and the reason.
+    Raises:
+        InputError: two photographs have one name, or one would be written onto itself or another.
     """
-    straighten, folder = partial(_straighten, Straightener(camera, keep=keep)), Path(folder)
-    photographs = [Path(path) for path in paths]
+    photographs, folder = [Path(path) for path in paths], Path(folder)
     _check_names(photographs)
     places = [folder / path.name for path in photographs]
+    check_not_onto(places, photographs)
+    straighten = partial(_straighten, Straightener(camera, keep=keep, view=view))
     run = executor.map if executor else map
     written, failed = [], []
     with _one_thread_each() if executor else nullcontext():
@@ -149,7 +168,8 @@ def _one_thread_each() -> Iterator[None]:
 def _straighten(straightener: Straightener, path: Path, place: Path) -> str | None:
     """One photograph from file to file; the reason where that cannot be."""
     try:
-        write_image(place, straightener(read_image(path, grey=False), reuse=True))
+        picture = read_picture(path)
+        write_bytes(place, encoded(straightener(picture.pixels, reuse=True), picture, place))
     except InputError as error:
         return str(error)
     return None
@@ -165,11 +185,6 @@ def _check_names(photographs: list[Path]) -> None:
                 " own, one after the other."
             )
         first[path.name] = path
-
-
-def straight_camera(camera: Camera, *, keep: str = "all") -> Camera:
-    """The camera of the straight pictures: a pin-hole without distortion."""
-    return Camera(camera.image_size, camera.straight_intrinsics(keep), Brown())
 
 
 def before_and_after(
