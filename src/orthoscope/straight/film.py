@@ -174,28 +174,9 @@ class _Film:
     """A film that is open for writing within a block, and at its place after it, unless the block failed."""
 
     def __init__(self, place: Path, rate: float, straightener: Straightener) -> None:
-<<<<<<< HEAD
-        suffix = place.suffix.lower()
-        if suffix not in CODECS:
-            raise InputError(
-                f"{place} cannot be written: {suffix or 'no suffix'} is no film; expected one of"
-                f" {', '.join(CODECS)}."
-            )
-        self.place, self.part = place, place.with_name(f".{place.stem}.{os.getpid()}.part{suffix}")
-        try:
-            place.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(
-                f"{place} cannot be written ({error.strerror}); choose another place."
-            ) from error
-        # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
-        code = cv2.VideoWriter_fourcc(*CODECS[suffix])
-        self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.camera.image_size)
-=======
         self.place, self.part = place, _part_of(place)
         code = cv2.VideoWriter_fourcc(*CODECS[place.suffix.lower()])  # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
         self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.view.image_size)
->>>>>>> main
 
     def __enter__(self) -> cv2.VideoWriter:
         if not self.film.isOpened():
