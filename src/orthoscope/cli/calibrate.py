@@ -23,8 +23,7 @@ Example:
   lens       free  k1 -0.2996 ± 0.0034  k2 0.140 ± 0.022  p1 0.00107 ± 0.00014  p2 0.00009 ± 0.00016 ...
   target     free: corners 0.12 mm rms from where they are said to be, 0.37 mm from the lowest to the highest
   choice     target free, lens free; next target free, lens brown loses 0.004 px held out
-  verdict    0.09 ± 0.01 px on photographs that were not used (0.07 px on those that were); it holds over 71 %
-             of the frame.
+  verdict    0.09 ± 0.01 px on photographs that were not used (0.07 px on those that were); it holds over 71 % of the frame.
   wrote      camera/detections.json, camera/calibration.json, camera/evaluation.json, camera/report.html
 
 \b
