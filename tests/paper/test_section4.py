@@ -20,7 +20,7 @@ from orthoscope.paper.documents import documents
 from orthoscope.paper.entries import MLDC, OURS, PAPER
 from orthoscope.paper.photographs import SPLITS, obliqueness, split
 from orthoscope.paper.section4 import Plan, run
-from orthoscope.simulation.render import photographs
+from orthoscope.simulation.render import rendered_photographs
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.target import chessboard
 
@@ -59,7 +59,7 @@ def made(scene, detections, tmp_path_factory):
     """The documents of a run with photographs."""
     folder = tmp_path_factory.mktemp("photos")
     files = {}
-    for name, image in photographs(scene, rng=np.random.default_rng(5)):
+    for name, image in rendered_photographs(scene, rng=np.random.default_rng(5)):
         files[name] = folder / f"{name}.png"
         write_image(files[name], image)
     return documents(run(LEAST, detections=detections), files)

@@ -33,7 +33,7 @@ from orthoscope.report.snippets import snippets
 from orthoscope.report.tables import (
     candidate_rows,
     cards,
-    lens_name,
+    lens_in_words,
     misfit_rows,
     parameters,
     view_rows,
@@ -313,7 +313,7 @@ def test_a_free_lens_is_named_with_what_it_stands_on(ordinary):
     camera = ordinary.calibration.camera
     lattice = Lattice.over(np.array([-1.0, -1.0]), np.array([1.0, 1.0]), (4, 4))
     free = FreeLens(camera.lens, Displacement(lattice, np.zeros((lattice.splines, 2))))
-    assert lens_name(replace(camera, lens=free)) == "free, on brown"
+    assert lens_in_words(replace(camera, lens=free)) == "free, on brown"
 
 
 def test_stretch_and_shear_are_what_the_print_was_made_with(shaped):

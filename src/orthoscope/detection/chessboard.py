@@ -20,7 +20,7 @@ import numpy as np
 
 from orthoscope.detection.copies import resized, to_photograph
 from orthoscope.detection.grid import cross, grid_shape
-from orthoscope.detection.lattices import Lattice, lattices
+from orthoscope.detection.lattices import CornerLattice, lattices
 from orthoscope.detection.opencv_finders import opencv_boards
 from orthoscope.detection.partial_board import Grid, filled, grid_of, laid_out, placements
 from orthoscope.detection.refine import Refined, refined
@@ -102,7 +102,7 @@ def board_size(grey: ndarray) -> tuple[int, int] | None:
     return None
 
 
-def _hanging_together(grey: ndarray) -> Iterator[tuple[Lattice, ndarray]]:
+def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray]]:
     """The largest lattices of each copy, and the copy."""
     shapes = set()
     for side in SIDES:

@@ -22,7 +22,7 @@ import numpy as np
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.resection import resect
-from orthoscope.fitting.residual_slopes import slopes_of
+from orthoscope.fitting.residual_slopes import residual_slopes
 from orthoscope.geometry.arrays import CalibrationError, Float, Int, ndarray
 from orthoscope.geometry.pose import Pose, nearest_rotation
 from orthoscope.models.camera import Camera
@@ -150,7 +150,7 @@ class _Sums:
         points, free = flat.detections.target.points, flat.uncertainty.names
         observations = Observations.by_corner(flat.detections)
         poses = observations.poses_of(flat.camera_from_target)
-        slopes, residual = slopes_of(observations, flat.camera, poses, points, free, moves=True)
+        slopes, residual = residual_slopes(observations, flat.camera, poses, points, free, moves=True)
         m, p = observations.present.shape
         pose = np.linalg.qr(slopes.pose.transpose(0, 2, 1))[0]
         smooth = polynomials(points, np.ones(p, dtype=bool))

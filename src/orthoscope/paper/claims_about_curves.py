@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import Bool, ndarray
-from orthoscope.paper.claims import MAIN, Claim, Verdict, share
+from orthoscope.paper.claims import MAIN, Claim, ClaimVerdict, share
 from orthoscope.paper.curves import Curve, Curves
 from orthoscope.paper.entries import FCCM, FCCM5, MLDC, NMLDC, REPEATED
-from orthoscope.paper.wording import each_of, listed, number, span, times
+from orthoscope.paper.wording import each_of, joined_words, short_number, span, times
 
 __all__ = [
     "Axis",
@@ -61,17 +61,22 @@ def better_on_test(where: str, curves: Curves, axis: Axis, *, mldc: str = MLDC) 
     """MLDC is more accurate than FCCM on data that was not used; mldc: which reading of it."""
     ours = mldc != MLDC
     if mldc not in curves or FCCM not in curves:
-        return Claim(where, MAIN, Verdict.OPEN, f"{mldc} was not tried beside FCCM.", ours)
+        return Claim(where, MAIN, ClaimVerdict.OPEN, f"{mldc} was not tried beside FCCM.", ours)
     both, (one, fccm) = _both(curves, mldc, FCCM)
     wins, of = int(_clearly_above(fccm, one)[both].sum()), int(both.sum())
     if not of:
         return Claim(
-            where, MAIN, Verdict.OPEN, f"At none of the {axis.levels} did both methods give a camera.", ours
+            where,
+            MAIN,
+            ClaimVerdict.OPEN,
+            f"At none of the {axis.levels} did both methods give a camera.",
+            ours,
         )
     mine, theirs = one.test_nce[both].mean(), fccm.test_nce[both].mean()
     finding = (
         f"{mldc}: test NCE below FCCM's, by more than their standard errors, at {wins} of {of}"
-        f" {axis.levels}; on average it is {number(mine)} against {number(theirs)}{times(mine, theirs)}."
+        f" {axis.levels}; on average it is {short_number(mine)} against"
+        f" {short_number(theirs)}{times(mine, theirs)}."
     )
     return Claim(where, MAIN, share(wins, of), finding + _true_poses(one, fccm) + _failed(one, fccm), ours)
 
@@ -89,14 +94,14 @@ def compensated(where: str, curves: Curves, axis: Axis) -> Claim:
     told = told & np.isfinite(ratio)
     above, of = int((ratio > 1.0 + SIMILAR)[told].sum()), int(told.sum())
     if not of:
-        return Claim(where, paper, Verdict.OPEN, "FCCM gave no camera.")
+        return Claim(where, paper, ClaimVerdict.OPEN, "FCCM gave no camera.")
     worst = int(np.nanargmax(np.where(told, ratio, np.nan)))
     finding = (
         f"On test views as noisy as the training views FCCM's NCE is more than {100 * SIMILAR:.0f} % above"
         " its training"
         f" NCE at {above} of {of} {axis.levels}; where it compares worst, with"
         f" {axis.at(fccm.levels[worst])}, it is"
-        f" {number(fccm.noisy_test_nce[worst])} against {number(fccm.training_nce[worst])}."
+        f" {short_number(fccm.noisy_test_nce[worst])} against {short_number(fccm.training_nce[worst])}."
     )
     return Claim(where, paper, share(above, of), finding + _true_poses(fccm) + _failed(fccm))
 
@@ -107,7 +112,7 @@ def same_on_test(where: str, curves: Curves, axis: Axis) -> Claim:
     told, (mldc,) = _both(curves, MLDC)
     told = told & np.isfinite(mldc.noisy_test_nce)
     if not told.any():
-        return Claim(where, paper, Verdict.OPEN, "MLDC gave no camera.")
+        return Claim(where, paper, ClaimVerdict.OPEN, "MLDC gave no camera.")
     ratio = mldc.noisy_test_nce[told] / mldc.training_nce[told]
     similar, of = int((np.abs(ratio - 1.0) <= SIMILAR).sum()), len(ratio)
     finding = (
@@ -126,7 +131,7 @@ def most_sensitive(where: str, curves: Curves, axis: Axis) -> Claim:
         return Claim(
             where,
             paper,
-            Verdict.OPEN,
+            ClaimVerdict.OPEN,
             "Fewer than two noise levels at which all three methods gave a camera.",
         )
     levels = three[0].levels[told]
@@ -138,7 +143,9 @@ def most_sensitive(where: str, curves: Curves, axis: Axis) -> Claim:
         f"For each pixel of noise the test NCE changes by {each_of(rises)}: most for {most}. "
         f"With {axis.at(levels[-1])} it is {each_of(last)}: greatest for {worst}."
     )
-    return Claim(where, paper, Verdict.HOLDS if most == NMLDC else Verdict.FAILS, finding + _failed(*three))
+    return Claim(
+        where, paper, ClaimVerdict.HOLDS if most == NMLDC else ClaimVerdict.FAILS, finding + _failed(*three)
+    )
 
 
 def greatest_error(where: str, curves: Curves, axis: Axis) -> Claim:
@@ -147,7 +154,10 @@ def greatest_error(where: str, curves: Curves, axis: Axis) -> Claim:
     told, three = _both(curves, NMLDC, FCCM, MLDC)
     if not told.any():
         return Claim(
-            where, paper, Verdict.OPEN, f"At none of the {axis.levels} did all three methods give a camera."
+            where,
+            paper,
+            ClaimVerdict.OPEN,
+            f"At none of the {axis.levels} did all three methods give a camera.",
         )
     nmldc, *others = three
     worst, of = (
@@ -167,14 +177,16 @@ def better_trained(where: str, curves: Curves, axis: Axis) -> Claim:
     paper = "The FCCM method obtains better results in the training step."
     told, three = _both(curves, FCCM, NMLDC, MLDC)
     if not told.any():
-        return Claim(where, paper, Verdict.OPEN, "Not all three methods gave a camera.")
+        return Claim(where, paper, ClaimVerdict.OPEN, "Not all three methods gave a camera.")
     last = int(np.flatnonzero(told)[-1])
     errors = {curve.name: float(curve.training_nce[last]) for curve in three}
     best = min(errors, key=errors.__getitem__)
     finding = (
         f"With {axis.at(three[0].levels[last])} the training NCE is {each_of(errors)}, lowest for {best}."
     )
-    return Claim(where, paper, Verdict.HOLDS if best == FCCM else Verdict.FAILS, finding + _failed(*three))
+    return Claim(
+        where, paper, ClaimVerdict.HOLDS if best == FCCM else ClaimVerdict.FAILS, finding + _failed(*three)
+    )
 
 
 def exact_without_noise(where: str, curves: Curves, axis: Axis) -> Claim:
@@ -183,11 +195,11 @@ def exact_without_noise(where: str, curves: Curves, axis: Axis) -> Claim:
     three = [curves[name] for name in (FCCM, NMLDC, MLDC)]
     told = {curve.name: float(curve.test_nce[0]) for curve in three if np.isfinite(curve.test_nce[0])}
     if not told:
-        return Claim(where, paper, Verdict.OPEN, "No method gave a camera.")
+        return Claim(where, paper, ClaimVerdict.OPEN, "No method gave a camera.")
     exact = [name for name, nce in told.items() if nce < EXACT]
     finding = (
         f"With {axis.at(three[0].levels[0])} a view and no noise the test NCE is {each_of(told)}: "
-        f"below {EXACT:g} for {listed(exact) if exact else 'none of them'}."
+        f"below {EXACT:g} for {joined_words(exact) if exact else 'none of them'}."
     )
     return Claim(where, paper, share(len(exact), len(three)), finding + _failed(*three))
 
@@ -201,7 +213,7 @@ def accurate_from_three(where: str, curves: Curves, axis: Axis) -> Claim:
     told, (mldc,) = _both(curves, MLDC)
     enough = told & (mldc.levels >= 3)
     if not enough.any():
-        return Claim(where, paper, Verdict.OPEN, "MLDC gave no camera from three images or more.")
+        return Claim(where, paper, ClaimVerdict.OPEN, "MLDC gave no camera from three images or more.")
     nce, views = mldc.test_nce[enough], mldc.levels[enough]
     accurate = int((nce < ACCURATE).sum())
     between = axis.at(views[0]) if len(views) == 1 else f"{views[0]:g} to {axis.at(views[-1])}"
@@ -224,18 +236,18 @@ def fewer_than_three(where: str, curves: Curves, axis: Axis) -> Claim:
         return Claim(
             where,
             paper,
-            Verdict.OPEN,
+            ClaimVerdict.OPEN,
             "MLDC gave no camera from fewer than three images, or none from more." + _failed(mldc),
         )
     reference = float(mldc.test_nce[enough].max())
     far = mldc.test_nce[few] > reference
-    said = listed(
+    said = joined_words(
         [
-            f"{number(nce)} with {axis.at(views)}"
+            f"{short_number(nce)} with {axis.at(views)}"
             for nce, views in zip(mldc.test_nce[few], mldc.levels[few], strict=True)
         ]
     )
-    finding = f"MLDC's test NCE is {said}; with three or more it is {number(reference)} at most."
+    finding = f"MLDC's test NCE is {said}; with three or more it is {short_number(reference)} at most."
     return Claim(where, paper, share(int(far.sum()), len(far)), finding + _failed(mldc))
 
 
@@ -297,4 +309,4 @@ def _failed(*curves: Curve) -> str:
         for curve in curves
         if curve.failures.any()
     ]
-    return f" Trials without a camera: {listed(failed)}." if failed else ""
+    return f" Trials without a camera: {joined_words(failed)}." if failed else ""

@@ -29,7 +29,7 @@ __all__ = [
     "PAPER",
     "REPAIRED",
     "REPEATED",
-    "Entry",
+    "PaperEntry",
     "every_lens",
     "fair_peers",
     "with_skew",
@@ -46,7 +46,7 @@ FCCM5, OWN_CENTRE = "FCCM 5 parameters", "FCCM pfet, own centre"
 SEARCHED = 2  # trials in which eq. (7) is searched
 
 
-class Entry(NamedTuple):
+class PaperEntry(NamedTuple):
     """A method with its settings, under the name that figures and tables give it.
 
     Attributes:
@@ -69,34 +69,34 @@ class Entry(NamedTuple):
 
 
 PAPER = (
-    Entry(FCCM, "fccm", {"lens": "brown:k1,k2"}),
-    Entry(NMLDC, "nmldc", {"lens": "pfet:a1,a2,a3,a4", "measure": "straight-image"}),
-    Entry(MLDC, "mldc", {"lens": "pfet", "correct": "literal"}, SEARCHED),
+    PaperEntry(FCCM, "fccm", {"lens": "brown:k1,k2"}),
+    PaperEntry(NMLDC, "nmldc", {"lens": "pfet:a1,a2,a3,a4", "measure": "straight-image"}),
+    PaperEntry(MLDC, "mldc", {"lens": "pfet", "correct": "literal"}, SEARCHED),
 )
 OURS = (
-    Entry(REPEATED, "mldc", {"lens": "pfet"}),
-    Entry(NEAREST, "mldc", {"lens": "pfet", "correct": "nearest"}),
-    Entry(REPAIRED, "nmldc", {"lens": "pfet"}),
-    Entry(OWN_CENTRE, "fccm", {"lens": "pfet", "own_centre": True}),
-    Entry(FCCM5, "fccm", {"lens": "brown"}),
+    PaperEntry(REPEATED, "mldc", {"lens": "pfet"}),
+    PaperEntry(NEAREST, "mldc", {"lens": "pfet", "correct": "nearest"}),
+    PaperEntry(REPAIRED, "nmldc", {"lens": "pfet"}),
+    PaperEntry(OWN_CENTRE, "fccm", {"lens": "pfet", "own_centre": True}),
+    PaperEntry(FCCM5, "fccm", {"lens": "brown"}),
 )
 
 
-def fair_peers() -> tuple[Entry, ...]:
+def fair_peers() -> tuple[PaperEntry, ...]:
     """Ours: the paper's methods as they can be made to work, and methods that the paper does not know."""
     others = sorted(set(METHODS) - {entry.method for entry in (*PAPER, *OURS)})
-    return (*OURS, *(Entry(name, name, TOLD.get(name, {})) for name in others))
+    return (*OURS, *(PaperEntry(name, name, TOLD.get(name, {})) for name in others))
 
 
-def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[Entry, ...]:
+def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[PaperEntry, ...]:
     """Every method with every lens, the coefficients free that a user gets by naming it."""
     return tuple(
-        Entry(f"{method} {lens}", method, {"lens": lens, **TOLD.get(method, {})})
+        PaperEntry(f"{method} {lens}", method, {"lens": lens, **TOLD.get(method, {})})
         for method in METHODS
         for lens in lenses
     )
 
 
-def with_skew(entries: tuple[Entry, ...]) -> tuple[Entry, ...]:
+def with_skew(entries: tuple[PaperEntry, ...]) -> tuple[PaperEntry, ...]:
     """The same, with oblique pixel axes allowed, as in the paper's Table 1."""
     return tuple(entry._replace(settings={**entry.settings, "skew": True}) for entry in entries)

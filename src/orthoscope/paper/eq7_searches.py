@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from orthoscope.paper.entries import MLDC, PAPER, Entry, fair_peers
-from orthoscope.paper.trials import Condition, Judgement, judged, simulated_trial
+from orthoscope.paper.entries import MLDC, PAPER, PaperEntry, fair_peers
+from orthoscope.paper.trials import Condition, Judgement, simulated_trial, trial_judged
 
 __all__ = ["ALIKE", "DAMPINGS", "WEIGHTS", "Eq7Search", "member", "rivals"]
 
@@ -70,7 +70,9 @@ def member(
         "weights": weights,
         "progress": costs,
     }
-    judgement = judged(Entry(MLDC, "mldc", settings), simulated_trial(scene, condition, seed=seed, trial=0))
+    judgement = trial_judged(
+        PaperEntry(MLDC, "mldc", settings), simulated_trial(scene, condition, seed=seed, trial=0)
+    )
     weighed = "" if weights == ALIKE else ", weights " + " ".join(f"{weight:g}" for weight in weights)
     return Eq7Search(scene, f"{damp} {damping:g}{weighed}", costs.last[1], judgement)
 
@@ -80,4 +82,4 @@ def rivals(scene: str, *, condition: Condition, seed: int) -> list[Eq7Search]:
     data = simulated_trial(scene, condition, seed=seed, trial=0)
     entries = [entry for entry in (*PAPER, *fair_peers()) if entry.name != MLDC]
     order = sorted(entries, key=lambda entry: entry.method != "mldc")
-    return [Eq7Search(scene, entry.name, float("nan"), judged(entry, data)) for entry in order]
+    return [Eq7Search(scene, entry.name, float("nan"), trial_judged(entry, data)) for entry in order]

@@ -12,7 +12,7 @@ import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.paper import claims_about_curves, claims_about_eq7
-from orthoscope.paper.claims import Claim, Verdict
+from orthoscope.paper.claims import Claim, ClaimVerdict
 from orthoscope.paper.claims_about_curves import Axis, Judge
 from orthoscope.paper.curves import Curves, curves_of
 from orthoscope.paper.entries import MLDC, PAPER
@@ -25,13 +25,13 @@ from orthoscope.paper.wording import each_of
 __all__ = [
     "Centre",
     "FigureWithClaims",
-    "Parameters",
+    "ParameterColumn",
     "centres",
     "eq7_claims",
     "fair_finding",
     "figures_with_claims",
     "on_photographs",
-    "parameters_of",
+    "parameter_columns",
     "stable_centre",
     "without_noise",
 ]
@@ -231,9 +231,9 @@ def stable_centre(results: Results) -> tuple[Claim, ...]:
         where, mldc = f"Section 5, {scene}", of_scene.get(MLDC)
         spread = {name: max(centre.x[1], centre.y[1]) for name, centre in of_scene.items()}
         if mldc is None or not np.isfinite(spread[MLDC]):
-            said.append(Claim(where, paper, Verdict.OPEN, "Fewer than two trials gave a centre."))
+            said.append(Claim(where, paper, ClaimVerdict.OPEN, "Fewer than two trials gave a centre."))
             continue
-        verdict = Verdict.HOLDS if spread[MLDC] < STEADY else Verdict.FAILS
+        verdict = ClaimVerdict.HOLDS if spread[MLDC] < STEADY else ClaimVerdict.FAILS
         finding = (
             f"Over {mldc.trials} trials its centre is at ({mldc.x[0]:.1f}, {mldc.y[0]:.1f}) px; standard"
             " deviations of the"
@@ -254,7 +254,7 @@ def fair_finding(results: Results) -> str:
 
 
 @dataclass(frozen=True)
-class Parameters:
+class ParameterColumn:
     """A column of Table 1: mean errors, and of fx, fy, cu, cv (pixels) and gamma (degrees) mean and standard
     deviation over the splits.
     """
@@ -266,7 +266,7 @@ class Parameters:
     failures: int
 
 
-def parameters_of(results: Results) -> list[Parameters]:
+def parameter_columns(results: Results) -> list[ParameterColumn]:
     """Table 1, from all points; the paper's three first."""
     most = max((outcome.level for outcome in results.on_photographs), default=0.0)
     whole = [outcome for outcome in results.on_photographs if outcome.level == most]
@@ -274,11 +274,11 @@ def parameters_of(results: Results) -> list[Parameters]:
     return [_parameters(name, [outcome for outcome in whole if outcome.entry == name]) for name in names]
 
 
-def _parameters(name: str, outcomes: Sequence[Outcome]) -> Parameters:
+def _parameters(name: str, outcomes: Sequence[Outcome]) -> ParameterColumn:
     given = [outcome.judgement for outcome in outcomes if not outcome.judgement.failure]
     fx, fy, cx, cy, skew = np.array([(j.fx, j.fy, j.cx, j.cy, j.skew) for j in given]).reshape(-1, 5).T
     columns = {"fx": fx, "fy": fy, "cu": cx, "cv": cy, "gamma": obliqueness(fx, skew)}
-    return Parameters(
+    return ParameterColumn(
         name,
         {
             key: (_mean(column), float(column.std(ddof=1)) if len(column) > 1 else float("nan"))

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from orthoscope.paper.curves import Curves
-from orthoscope.paper.entries import Entry
+from orthoscope.paper.entries import PaperEntry
 from orthoscope.paper.eq7_searches import Eq7Search
 from orthoscope.paper.trials import Judgement, Outcome
 from orthoscope.version import __version__
@@ -61,7 +61,7 @@ def trials_csv(outcomes: Sequence[Outcome]) -> str:
     return table_csv(columns, ((o.study, o.scene, o.level, o.entry, o.trial, *o.judgement) for o in outcomes))
 
 
-def entries_csv(entries: Sequence[Entry], *, seed: int) -> str:
+def entries_csv(entries: Sequence[PaperEntry], *, seed: int) -> str:
     """What each name stands for: method, settings, the seed of the run and the version that made it."""
     rows = (
         (

@@ -14,18 +14,18 @@ import numpy as np
 
 from orthoscope.geometry.numbers import ABSENT
 from orthoscope.methods import METHODS
-from orthoscope.paper.claims import Claim, Verdict, headline, of_sentence
+from orthoscope.paper.claims import Claim, ClaimVerdict, main_headline, of_sentence
 from orthoscope.paper.curves import curves_of
 from orthoscope.paper.entries import PAPER
 from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
-    Parameters,
+    ParameterColumn,
     centres,
     eq7_claims,
     fair_finding,
     figures_with_claims,
     on_photographs,
-    parameters_of,
+    parameter_columns,
     stable_centre,
     without_noise,
 )
@@ -65,12 +65,12 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         test_views=TEST_VIEWS,
         splits=SPLITS,
         noise=PAPERS_NOISE,
-        headline=headline(every),
+        headline=main_headline(every),
         every=every,
         summary=_summary(every),
         counts=[
             (verdict.value, number, _tone(verdict))
-            for verdict in Verdict
+            for verdict in ClaimVerdict
             if (number := verdicts.count(verdict))
         ],
         sentences=len(verdicts),
@@ -88,7 +88,7 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         real=_figure(real) if real else None,
         detections=results.detections,
         fig7=_fig7(straightened),
-        parameters=_parameters(parameters_of(results)) if real else [],
+        parameters=_parameters(parameter_columns(results)) if real else [],
     )
 
 
@@ -164,7 +164,7 @@ def _with_spread(pair: tuple[float, float]) -> str:
     return " ± ".join(_number(value, 2) for value in pair)
 
 
-def _tone(verdict: Verdict) -> str:
+def _tone(verdict: ClaimVerdict) -> str:
     """The class of a verdict's chip."""
     return verdict.name.lower()
 
@@ -229,7 +229,7 @@ def _lenses(results: Results) -> list[tuple[str, str, list[Cell], str]]:
     return rows
 
 
-def _parameters(table: list[Parameters]) -> list[tuple[str, list[str]]]:
+def _parameters(table: list[ParameterColumn]) -> list[tuple[str, list[str]]]:
     """Table 1 as the paper prints it, a row for each parameter and a column for each method, the names
     first.
     """

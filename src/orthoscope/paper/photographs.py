@@ -18,7 +18,7 @@ from orthoscope.files.images import read_image
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.paper.entries import OURS, PAPER, REPEATED, fair_peers, with_skew
 from orthoscope.paper.subgrids import on_subgrid, subgrids
-from orthoscope.paper.trials import Outcome, Trial, judged
+from orthoscope.paper.trials import Outcome, Trial, trial_judged
 from orthoscope.straight.undistort import undistort
 from orthoscope.targets.detections import Detections
 
@@ -86,7 +86,7 @@ def split_outcomes(
             _points(detections, grid),
             entry.name,
             turn,
-            judged(entry, Trial(on_subgrid(training, grid), test, test)),
+            trial_judged(entry, Trial(on_subgrid(training, grid), test, test)),
         )
         for grid in grids
         for entry in with_skew((*PAPER, *fair_peers()))

@@ -28,7 +28,7 @@ from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
-from orthoscope.paper.entries import Entry
+from orthoscope.paper.entries import PaperEntry
 from orthoscope.paper.subgrids import on_subgrid
 from orthoscope.simulation.scene import paper_scene, simulate_detections
 from orthoscope.targets.detections import Detections
@@ -41,9 +41,9 @@ __all__ = [
     "Outcome",
     "Study",
     "Trial",
-    "judged",
     "simulated",
     "simulated_trial",
+    "trial_judged",
     "trial_outcomes",
 ]
 
@@ -68,7 +68,7 @@ class Study(NamedTuple):
     name: str
     levels: tuple[float, ...]
     conditions: tuple[Condition, ...]
-    entries: tuple[Entry, ...]
+    entries: tuple[PaperEntry, ...]
 
 
 class Trial(NamedTuple):
@@ -124,7 +124,7 @@ class Outcome(NamedTuple):
     judgement: Judgement
 
 
-def judged(entry: Entry, trial: Trial) -> Judgement:
+def trial_judged(entry: PaperEntry, trial: Trial) -> Judgement:
     """Calibrate from the training views and judge on both; a CalibrationError is an outcome like any"
     " other."""
     try:
@@ -188,7 +188,7 @@ def simulated_trial(scene: str, condition: Condition, *, seed: int, trial: int) 
 def trial_outcomes(study: Study, scene: str, *, seed: int, trial: int) -> list[Outcome]:
     """Every entry at every level of a study, in one trial."""
     return [
-        Outcome(study.name, scene, level, entry.name, trial, judged(entry, data))
+        Outcome(study.name, scene, level, entry.name, trial, trial_judged(entry, data))
         for level, data in zip(study.levels, _data(study.conditions, scene, seed, trial), strict=True)
         for entry in study.entries
         if entry.most_trials is None or trial < entry.most_trials

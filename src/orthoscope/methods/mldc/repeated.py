@@ -31,6 +31,7 @@ import numpy as np
 
 from orthoscope.fitting.initial_camera import StartingCameras
 from orthoscope.fitting.lens_fit import FOCAL
+from orthoscope.fitting.observations import Poses
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import (
@@ -257,7 +258,7 @@ class _Repetition:
             return None
         return _Round(Estimate(fit.unknowns, poses), fit.cost)
 
-    def _step_two(self, camera: Camera, poses) -> Solution[Camera]:
+    def _step_two(self, camera: Camera, poses: Poses) -> Solution[Camera]:
         free = (*self._theta.names, "stretch") if self._stretches else self._theta.names
         return refit_centred_lens(
             *pairs_of(self._bases, poses), start=camera, free=free, loss=self._loss, options=INNER
