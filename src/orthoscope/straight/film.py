@@ -175,7 +175,8 @@ class _Film:
 
     def __init__(self, place: Path, rate: float, straightener: Straightener) -> None:
         self.place, self.part = place, _part_of(place)
-        code = cv2.VideoWriter_fourcc(*CODECS[place.suffix.lower()])  # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
+        # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
+        code = cv2.VideoWriter_fourcc(*CODECS[place.suffix.lower()])
         self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.view.image_size)
 
     def __enter__(self) -> cv2.VideoWriter:
