@@ -179,17 +179,18 @@ FOR_EVERY_STRAIGHTENED = pytest.mark.parametrize("camera", STRAIGHTENED.values()
 def test_keeping_all_shows_every_photographed_pixel(camera):
     straight = camera.straight_intrinsics("all")
     border = camera.undistort_pixels(image_border(SIZE), straight)
-    assert_allclose(
-        [border.min(0), border.max(0)], [[0.0, 0.0], [639.0, 479.0]], atol=1e-6
-    )  # all, and nothing wasted
+    last = np.array(SIZE) - 1.0
+    assert ((border > -1e-6) & (border < last + 1e-6)).all()
+    spans = np.ptp(border, axis=0) / last
+    assert spans.max() == pytest.approx(1.0)  # nothing wasted but what the aspect asks for
+    assert_allclose(border.min(0) + border.max(0), last, atol=1e-6)
 
 
 @FOR_EVERY_STRAIGHTENED
 def test_keeping_the_valid_shows_nothing_but_photographed_pixels(camera):
     straight = camera.straight_intrinsics("valid")
     border = camera.distort_pixels(image_border(SIZE), straight)
-    # the photograph's border was sampled at 256 places: between them it bulges by less than half a pixel
-    assert ((border > -0.5) & (border < np.array(SIZE) - 0.5)).all()
+    assert ((border >= 0.0) & (border <= np.array(SIZE) - 1.0)).all()
 
 
 def test_a_fisheye_is_kept_to_the_widest_angle():
@@ -197,9 +198,10 @@ def test_a_fisheye_is_kept_to_the_widest_angle():
     straight = camera.straight_intrinsics("all", widest=np.deg2rad(70.0))
     rays = np.array([[np.sin(1.2), 0.0, np.cos(1.2)]])  # 69 degrees
     assert_array_less(straight.to_pixels(rays[:, :2] / rays[:, 2:])[:, 0], 640.0)
-    assert straight.to_pixels(np.array([[np.tan(np.deg2rad(70.0)), 0.0]]))[0, 0] == pytest.approx(
-        639.0, abs=0.5
-    )
+    down = straight.to_pixels(np.array([[0.0, np.tan(np.deg2rad(70.0))]]))[0, 1]
+    assert down == pytest.approx(
+        479.0, abs=0.5
+    )  # the shorter side has the angle, the longer keeps the aspect
 
 
 def test_another_word_for_keep_is_refused():
@@ -235,3 +237,45 @@ def test_an_image_without_size_is_refused():
 def test_the_border_goes_round_the_image_once():
     border = image_border((5, 4), samples=2)
     assert_allclose(border, [[0, 0], [2, 0], [4, 0], [4, 1.5], [4, 3], [2, 3], [0, 3], [0, 1.5]])
+
+
+PIXELS = np.array([[0.0, 0.0], [100.0, 50.0], [639.0, 479.0], [320.5, 7.25]])
+RESIZABLE = Camera(
+    SIZE, Intrinsics(500.0, 501.0, 320.0, 240.0, 0.3), MILD, Intrinsics(505.0, 503.0, 318.0, 243.0)
+)
+
+
+def test_a_resized_camera_sees_what_scaled_photographs_show():
+    half = RESIZABLE.resized((320, 160))
+    assert half.image_size == (320, 160)
+    scale = np.array([320 / SIZE[0], 160 / SIZE[1]])
+    assert_allclose(half.unproject((PIXELS + 0.5) * scale - 0.5), RESIZABLE.unproject(PIXELS), atol=1e-12)
+
+
+def test_a_cropped_camera_sees_what_the_part_shows():
+    part = RESIZABLE.cropped(60, 30, (200, 100))
+    assert part.image_size == (200, 100)
+    assert_allclose(part.unproject(PIXELS - np.array([60, 30])), RESIZABLE.unproject(PIXELS), atol=1e-12)
+
+
+def test_a_binned_camera_sees_the_middle_of_each_block_and_cuts_what_is_left_over():
+    binned = RESIZABLE.binned(7)
+    assert binned.image_size == (SIZE[0] // 7, SIZE[1] // 7)
+    middles = np.array([[3.0, 3.0], [10.0, 73.0]])  # of the first block, and of another
+    assert_allclose(binned.unproject((middles - 3.0) / 7.0), RESIZABLE.unproject(middles), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda camera: camera.resized((0, 100)), r"the size is 0x100"),
+        (lambda camera: camera.cropped(-1, 0, (10, 10)), r"is not within an image of"),
+        (lambda camera: camera.cropped(0, 0, (10_000, 10)), r"is not within an image of"),
+        (lambda camera: camera.binned(0), r"binning by 0 is not possible"),
+        (lambda camera: camera.binned(100_000), r"binning by 100000 is not possible"),
+        (lambda camera: camera.resized((10**7, 10)), r"1 to 1000000 pixels each"),
+    ],
+)
+def test_a_size_that_cannot_be_is_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        change(RESIZABLE)

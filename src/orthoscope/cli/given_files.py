@@ -40,17 +40,21 @@ def _files(given: Any) -> Iterator[Path]:
         yield from _named(str(given))
 
 
-def _named(text: str) -> Iterator[Path]:
-    import glob
-
+def _pictures() -> set[str]:
+    """Suffixes of photographs and films; who names a folder is about to load OpenCV anyway."""
     from orthoscope.files.images import SUFFIXES
     from orthoscope.straight.film import CODECS
 
-    pictures = {*SUFFIXES, *CODECS}
+    return {*SUFFIXES, *CODECS}
+
+
+def _named(text: str) -> Iterator[Path]:
+    import glob
+
     try:
         path = Path(text)
         if path.is_dir():
-            yield from (file for file in path.iterdir() if file.suffix.lower() in pictures)
+            yield from (file for file in path.iterdir() if file.suffix.lower() in _pictures())
         elif path.exists():
             yield path
         elif "#" in text:

@@ -22,8 +22,8 @@ Examples:
 \b
 CAMERA is ours or any tool's (`orthoscope tools`). PHOTOS are files, folders and globs of photographs; and
 video files (mp4, m4v, mov, mkv, avi), each named by itself. Photographs keep their depth, channels, EXIF,
-profile and file type; films their sound and time stamps where PyAV is installed (pip install
-'orthoscope[video]').
+profile and file type; films their sound and time stamps where PyAV is installed
+(pip install 'orthoscope[video]').
 """
 
 
@@ -113,9 +113,7 @@ def undistort(
 
 
 def write_beside(camera: Any, view: Any, out: Path, *, maps: bool) -> list[Path]:
-    """Write the straight pictures' camera, where it is one that files can hold, and the maps that were asked
-    for.
-    """
+    """Write the straight pictures' camera, where it is one that files can hold, and the maps that were asked for."""
     import io
 
     import numpy as np

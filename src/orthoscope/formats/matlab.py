@@ -36,6 +36,8 @@ DTYPES = {
 STRUCT_CLASS, CHAR_CLASS, DOUBLE_CLASS, OPAQUE_CLASS = 2, 4, 6, 17
 NUMERIC_CLASSES = range(DOUBLE_CLASS, 16)
 NAME_LENGTH = 32  # bytes of a field's name
+# What reading damaged bytes may raise; a generator that ends too soon is a RuntimeError.
+DAMAGED = (struct.error, zlib.error, ValueError, LookupError, ArithmeticError, MemoryError, RuntimeError)
 DEEPEST = 8  # structs within structs
 MOST_FIELDS = 4096
 
@@ -52,7 +54,7 @@ def _read(document: Document, image_size: tuple[int, int] | None) -> Mapping[str
     little = document.content[126:128] == b"IM"
     try:
         variables = dict(_variables(document.content[128:], "<" if little else ">", 0))
-    except (struct.error, zlib.error, ValueError, KeyError, IndexError, OverflowError, MemoryError) as error:
+    except DAMAGED as error:
         raise document.refuse(f"is damaged ({error}); expected a MAT-file of version 5") from error
     cameras = {name: fields for name, fields in _structs(variables) if "RadialDistortion" in fields}
     if not cameras:

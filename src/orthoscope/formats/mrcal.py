@@ -1,6 +1,7 @@
 """mrcal's .cameramodel: a Python dictionary of plain values, with comments.
 
-LENSMODEL_OPENCV4, 5, 8 and 12 are OpenCV's, LENSMODEL_PINHOLE has no coefficients; a centre as ours. The
+LENSMODEL_OPENCV4, 5, 8 and 12 are OpenCV's, LENSMODEL_PINHOLE has no coefficients, nor has
+LENSMODEL_STEREOGRAPHIC, 2 tan(theta / 2); a centre as ours. The
 camera stands in the reference frame (no extrinsics). valid_intrinsics_region is the hull of the corners that
 the camera was made from: beyond it the camera is not known.
 """
@@ -90,6 +91,7 @@ MRCAL = Format(
         Holding("rational", "LENSMODEL_OPENCV8", OPENCV_ORDER[:8]),
         Holding("brown", "LENSMODEL_OPENCV12", OPENCV_ORDER[:12]),
         Holding("rational", "LENSMODEL_OPENCV12", OPENCV_ORDER[:12]),
+        Holding("stereographic", "LENSMODEL_STEREOGRAPHIC", ()),
         Holding("brown", "LENSMODEL_OPENCV4", OPENCV_ORDER[:4], written=False),
         Holding("brown", "LENSMODEL_PINHOLE", (), written=False),
     ),

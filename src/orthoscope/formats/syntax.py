@@ -30,6 +30,8 @@ __all__ = ["Document", "json_number", "matrix", "number", "numbers", "whole_numb
 LARGEST_FILE = 64 * 1024 * 1024
 # Brackets within brackets; tools use three or four.
 DEEPEST = 40
+# Squares and products of what is read must be numbers too.
+LARGEST_NUMBER = 1e100
 # The longest word that an error repeats.
 LONGEST_SHOWN = 40
 
@@ -120,7 +122,7 @@ def number(value: Any, what: str, document: Document) -> float:
             converted = float("nan") if isinstance(value, str) and "_" in value else float(value)
         except (ValueError, OverflowError):
             converted = float("nan")
-        if np.isfinite(converted):
+        if abs(converted) <= LARGEST_NUMBER:  # which NaN is not
             return converted
     raise document.refuse(f"has {_shown(value)} as {what}; expected a finite number")
 

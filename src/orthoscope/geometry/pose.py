@@ -39,7 +39,9 @@ class Pose:
 
     def __post_init__(self) -> None:
         rotation = frozen(self.rotation, (3, 3), "rotation")
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
+        if np.abs(rotation).max() > 2.0 or not (
+            np.abs(rotation @ rotation.T - np.eye(3)).max() <= 1e-6 and np.linalg.det(rotation) > 0
+        ):
             raise InputError(
                 "rotation is not orthonormal with determinant +1; hand in a proper rotation matrix."
             )

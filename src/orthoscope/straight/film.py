@@ -175,8 +175,7 @@ class _Film:
 
     def __init__(self, place: Path, rate: float, straightener: Straightener) -> None:
         self.place, self.part = place, _part_of(place)
-        # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
-        code = cv2.VideoWriter_fourcc(*CODECS[place.suffix.lower()])
+        code = cv2.VideoWriter_fourcc(*CODECS[place.suffix.lower()])  # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
         self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.view.image_size)
 
     def __enter__(self) -> cv2.VideoWriter:

@@ -124,7 +124,7 @@ def _thing(content: bytes, kind: str, path: str | Path, judged: Sequence[Calibra
     """What such content means; for an evaluation with the calibration that it judges."""
     try:
         return msgspec.json.decode(content, type=_document(kind)).core(*judged)
-    except (msgspec.ValidationError, InputError, OverflowError) as error:
+    except (msgspec.DecodeError, InputError, ValueError, OverflowError, RecursionError) as error:
         what = str(error).rstrip(".")
         raise InputError(
             f"{path} does not hold proper {kind} data: {what}. Mend that place or write the file again."
@@ -188,6 +188,12 @@ def _article(kind: str) -> str:
 
 def _kind(content: bytes, path: str | Path) -> str:
     """What the file says it is, where we can read it."""
+    try:
+        content.decode()
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path} is not text (byte {error.start} is no UTF-8); expected JSON that orthoscope wrote."
+        ) from error
     try:
         header = msgspec.json.decode(content, type=_Header)
     except msgspec.ValidationError as error:
