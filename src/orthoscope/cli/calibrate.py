@@ -23,7 +23,8 @@ Example:
   lens       free  k1 -0.2996 ± 0.0034  k2 0.140 ± 0.022  p1 0.00107 ± 0.00014  p2 0.00009 ± 0.00016 ...
   target     free: corners 0.12 mm rms from where they are said to be, 0.37 mm from the lowest to the highest
   choice     target free, lens free; next target free, lens brown loses 0.004 px held out
-  verdict    0.09 ± 0.01 px on photographs that were not used (0.07 px on those that were); it holds over 71 % of the frame.
+  verdict    0.09 ± 0.01 px on photographs that were not used (0.07 px on those that were); it holds over 71 %
+             of the frame.
   wrote      camera/detections.json, camera/calibration.json, camera/evaluation.json, camera/report.html
 
 \b
@@ -50,6 +51,13 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
     metavar="NAME",
     help="Leave this photograph out, once for each; detections.json keeps it.",
 )
+@click.option(
+    "--set",
+    "more",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Any other setting of the method, once for each: --method mldc --set correct=literal --set weights=1,1,1e4.",
+)
 @options.jobs
 @options.cluster
 @click.option(
@@ -64,7 +72,8 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
     "--export",
     type=options.TOOL,
     help=(
-        "Also write the camera for a tool (`orthoscope tools` lists them), into OUT/camera-TOOL; --lens auto then"
+        "Also write the camera for a tool (`orthoscope tools` lists them), into OUT/camera-TOOL; --lens auto"
+        " then"
         " takes a lens that the tool has."
     ),
 )
@@ -93,6 +102,7 @@ def calibrate_into(
     image_size: tuple[int, int] | None = None,
     folds: int = 5,
     without: tuple[str, ...] = (),
+    more: tuple[str, ...] = (),
     jobs: int | None = None,
     cluster: str | None = None,
     export: str | None = None,
@@ -106,6 +116,7 @@ def calibrate_into(
     from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.judged import EVALUATION
+    from orthoscope.cli.method_settings import settings_from
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines
     from orthoscope.evaluation.evaluate import evaluate
@@ -127,7 +138,7 @@ def calibrate_into(
         "loss": loss,
         "among": among or None,
     }
-    given = {name: value for name, value in given.items() if value is not None}
+    given = {name: value for name, value in given.items() if value is not None} | settings_from(more)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         detections, files = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress
