@@ -20,7 +20,7 @@ from orthoscope.formats.own.json import save
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
-from orthoscope.simulation.render import photographs
+from orthoscope.simulation.render import rendered_photographs
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.target import chessboard
 
@@ -83,7 +83,8 @@ def _photographs(folder: Path, calibration: Calibration) -> Path:
     folder.mkdir()
     scene = Scene(calibration.camera, chessboard(14, 9, 0.02), calibration.camera_from_target[:PICTURES])
     pictures = [
-        cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR) for _, grey in photographs(scene, rng=np.random.default_rng(0))
+        cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
+        for _, grey in rendered_photographs(scene, rng=np.random.default_rng(0))
     ]
     for i in range(COUNT):
         if i < PICTURES:

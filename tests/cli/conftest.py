@@ -16,7 +16,7 @@ from orthoscope.cli import main
 from orthoscope.files.images import write_image
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
-from orthoscope.simulation.render import Renderer, photographs
+from orthoscope.simulation.render import Renderer, rendered_photographs
 from orthoscope.simulation.scene import Scene, random_views
 from orthoscope.targets.target import chessboard
 
@@ -61,7 +61,9 @@ def scene() -> Scene:
 def photos(scene, tmp_path_factory) -> Path:
     """The scene's photographs, in a folder."""
     folder = tmp_path_factory.mktemp("rendered") / "photos"
-    for name, image in photographs(scene, rng=np.random.default_rng(4), renderer=Renderer(scene.camera)):
+    for name, image in rendered_photographs(
+        scene, rng=np.random.default_rng(4), renderer=Renderer(scene.camera)
+    ):
         write_image(folder / f"{name}.png", image)
     return folder
 

@@ -11,7 +11,7 @@ import pytest
 
 from orthoscope.cli import verbs
 from orthoscope.files.images import read_image
-from orthoscope.formats.own.json import load, load_camera, load_detections
+from orthoscope.formats.own.json import load, load_detections, load_own_camera
 from orthoscope.models.difference import frame_grid, image_difference
 
 TARGET = "chessboard:9x6:25mm"
@@ -42,7 +42,7 @@ def test_calibrate_writes_what_it_says_and_finds_the_camera(calibrated, scene):
         "evaluation.json",
         "report.html",
     }
-    camera = load_camera(calibrated / "calibration.json")
+    camera = load_own_camera(calibrated / "calibration.json")
     seen = np.concatenate([view.pixels for view in load_detections(calibrated / "detections.json").views])
     apart = np.hypot(*image_difference(scene.camera, camera, seen).T)
     assert apart.max() < 0.25  # ten photographs of 640x480 with 0.03 px of corner noise
@@ -181,7 +181,10 @@ def test_simulate_makes_detections_from_which_its_camera_is_found_again(run, tmp
         tmp_path / "out",
     )
     assert json.loads(told.out)["rms_px"] < 1e-9
-    truth, found = load_camera(tmp_path / "truth.json"), load_camera(tmp_path / "out/calibration.json")
+    truth, found = (
+        load_own_camera(tmp_path / "truth.json"),
+        load_own_camera(tmp_path / "out/calibration.json"),
+    )
     assert (
         np.abs(image_difference(truth, found, frame_grid(truth.image_size))).max() < 1e-6
     )  # no noise: only rounding
@@ -236,5 +239,5 @@ def test_demo_finds_the_camera_it_rendered_with(run, tmp_path):
     assert told.code == 0, told.err
     assert "truth" in told.out
     assert (tmp_path / "report.html").stat().st_size > 100_000
-    truth, found = load_camera(tmp_path / "truth.json"), load_camera(tmp_path / "calibration.json")
+    truth, found = load_own_camera(tmp_path / "truth.json"), load_own_camera(tmp_path / "calibration.json")
     assert np.nanmean(np.abs(image_difference(truth, found, frame_grid(truth.image_size)))) < 0.1

@@ -14,7 +14,7 @@ from numpy.testing import assert_array_equal
 
 from helpers.laws import FREE_LENSES_TO_TRY, for_every_lens
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty, Variances
-from orthoscope.formats.own.json import load, load_calibration, load_camera, load_detections, save
+from orthoscope.formats.own.json import load, load_calibration, load_detections, load_own_camera, save
 from orthoscope.formats.own.json_layout import lay_out
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
@@ -223,12 +223,12 @@ def test_a_camera_with_any_lens_comes_back(tmp_path, lens):
     for frame in (None, Intrinsics(480.0, 490.0, 300.0, 220.0)):
         camera = Camera((640, 480), CAMERA.intrinsics, lens, frame)
         save(camera, tmp_path / "camera.json")
-        assert_same_camera(load_camera(tmp_path / "camera.json"), camera)
+        assert_same_camera(load_own_camera(tmp_path / "camera.json"), camera)
 
 
 def test_the_camera_and_the_detections_of_a_calibration_can_be_had_alone(tmp_path):
     save(some_calibration(), tmp_path / "calibration.json")
-    assert_same_camera(load_camera(tmp_path / "calibration.json"), CAMERA)
+    assert_same_camera(load_own_camera(tmp_path / "calibration.json"), CAMERA)
     assert_same_detections(load_detections(tmp_path / "calibration.json"), some_detections())
 
 
@@ -454,7 +454,7 @@ def test_a_rotation_that_is_none_is_refused(tmp_path):
 
 def test_a_coefficient_left_out_has_its_usual_value(tmp_path):
     path = written(tmp_path, CAMERA, ('"s1": 0.0,', ""))
-    assert_same_camera(load_camera(path), CAMERA)
+    assert_same_camera(load_own_camera(path), CAMERA)
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path):
@@ -463,7 +463,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"camera\.json holds a camera; expected calibration"):
         load_calibration(tmp_path / "camera.json")
     with pytest.raises(InputError, match=r"detections\.json holds detections; expected camera"):
-        load_camera(tmp_path / "detections.json")
+        load_own_camera(tmp_path / "detections.json")
     with pytest.raises(InputError, match=r"camera\.json holds a camera; expected detections"):
         load_detections(tmp_path / "camera.json")
 

@@ -23,8 +23,8 @@ from orthoscope.simulation.render import (
     WHITE,
     Renderer,
     demo_scene,
-    photographs,
     render,
+    rendered_photographs,
 )
 from orthoscope.simulation.scene import Scene, random_views
 from orthoscope.targets.target import Target, chessboard
@@ -227,7 +227,7 @@ def test_what_is_known_by_its_points_only_cannot_be_drawn():
 
 def test_photographs_are_one_for_each_view_by_name():
     scene = Scene(PIN_HOLE, BOARD, (facing(-0.08, -0.05, 0.3), facing(-0.08, -0.05, 0.4)))
-    made = dict(photographs(scene, rng=rng()))
+    made = dict(rendered_photographs(scene, rng=rng()))
     assert list(made) == ["view01", "view02"]
     assert all(image.shape == (160, 200) and image.dtype == np.uint8 for image in made.values())
 

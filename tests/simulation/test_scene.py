@@ -12,9 +12,9 @@ from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, Division, KannalaBrandt
 from orthoscope.simulation.scene import (
-    BORDER,
-    GRAZING,
-    LEAST_SEEN,
+    BORDER_SHARE,
+    GRAZING_ANGLE,
+    LEAST_SEEN_SHARE,
     Scene,
     paper_scene,
     random_views,
@@ -82,7 +82,9 @@ def test_boards_stand_in_front_tilted_as_asked_and_never_at_a_grazing_angle(came
         assert middle[2] > 0
         assert least - 1e-9 <= tilt <= greatest + 1e-9  # rounding in arccos
         sight = pose.apply(BOARD.points)
-        assert (sight @ pose.rotation[:, 2] >= np.cos(GRAZING) * np.linalg.norm(sight, axis=1) - 1e-12).all()
+        assert (
+            sight @ pose.rotation[:, 2] >= np.cos(GRAZING_ANGLE) * np.linalg.norm(sight, axis=1) - 1e-12
+        ).all()
 
 
 @every_camera
@@ -101,7 +103,7 @@ def test_boards_reach_all_four_corners_and_every_part_of_the_image(name):
     scene = Scene(camera, BOARD, random_views(camera, BOARD, 20, rng=rng()))
     low, high = boxes(scene)
     frame = np.array(camera.image_size) - 1.0
-    near = 3 * BORDER * frame  # the gap itself and as much again and again for the fixed point's rest
+    near = 3 * BORDER_SHARE * frame  # the gap itself and as much again and again for the fixed point's rest
     left, top = (low < near).T
     right, bottom = (high > frame - near).T
     for in_corner in (left & top, right & top, left & bottom, right & bottom):
@@ -114,7 +116,7 @@ def test_boards_reach_all_four_corners_and_every_part_of_the_image(name):
 def test_partial_views_leave_corners_out_but_keep_a_quarter(camera):
     scene = Scene(camera, BOARD, random_views(camera, BOARD, 20, rng=rng(), whole=False))
     seen = np.isfinite(scene.corner_pixels()[..., 0]).mean(1)
-    assert (seen >= LEAST_SEEN).all()
+    assert (seen >= LEAST_SEEN_SHARE).all()
     assert (seen < 1.0).any()
 
 

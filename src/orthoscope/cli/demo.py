@@ -1,6 +1,4 @@
-"""`orthoscope demo`: no photographs at hand, so some are rendered; then the main job, and how far its camera
-is from the true one.
-"""
+"""`orthoscope demo`: some photographs are rendered, then the main job, and how far its camera is from the truth."""
 
 from __future__ import annotations
 

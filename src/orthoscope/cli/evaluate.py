@@ -60,7 +60,7 @@ def evaluate(
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
     from orthoscope.cli.executors import threads
     from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.judged import EVALUATION, judged
+    from orthoscope.cli.judged import EVALUATION, judged_calibration
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, to_json
     from orthoscope.evaluation.evaluate import evaluate_on
@@ -81,7 +81,7 @@ def evaluate(
                 " and their target: --on PHOTOS --target chessboard:9x6:25mm."
             )
     if not others or loaded is None:
-        evaluation = judged(path, folds=folds, jobs=jobs, cluster=cluster)
+        evaluation = judged_calibration(path, folds=folds, jobs=jobs, cluster=cluster)
         click.echo(
             text_of(evaluation)
             if as_json

@@ -1,5 +1,4 @@
-"""Where many photographs or trials are worked on at once: threads or processes here, or the workers of a Dask
-cluster.
+"""Where many photographs or trials are worked on at once: threads or processes here, or a Dask cluster.
 
 Each is a `concurrent.futures.Executor` that is handed down; what is left to do when a verb is stopped, by
 Ctrl-C or by SIGTERM, is dropped, and nobody stays behind: threads finish the photograph that they are at,
@@ -17,14 +16,19 @@ from contextlib import contextmanager
 
 __all__ = ["cluster", "processes", "single_threaded", "threads"]
 
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-PATIENCE = 10  # seconds in which a scheduler has to answer
+# These variables of the environment tell numpy's libraries how many threads to use.
+THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+# A scheduler has to answer within this time, seconds.
+ANSWER_TIMEOUT = 10
 
 
 @contextmanager
 def threads(jobs: int | None, address: str | None = None) -> Iterator[Executor]:
-    """For work that OpenCV does, which lets other threads run: so many of them, as many as there are cores,
-    or a cluster.
+    """An executor for work that OpenCV does, which lets other threads run.
+
+    Args:
+        jobs: how many threads; as many as there are cores by default.
+        address: of a Dask scheduler, whose workers then take the threads' place.
     """
     from concurrent.futures import ThreadPoolExecutor
 
@@ -34,8 +38,11 @@ def threads(jobs: int | None, address: str | None = None) -> Iterator[Executor]:
 
 @contextmanager
 def processes(jobs: int | None, address: str | None = None) -> Iterator[Executor | None]:
-    """For work that Python does: so many fresh processes, as many as there are cores, or a cluster; None for
-    one job, which needs none.
+    """An executor for work that Python does; None for one job, which needs none.
+
+    Args:
+        jobs: how many fresh processes; as many as there are cores by default.
+        address: of a Dask scheduler, whose workers then take the processes' place.
     """
     jobs = jobs or os.cpu_count() or 1
     if address:
@@ -55,10 +62,12 @@ def processes(jobs: int | None, address: str | None = None) -> Iterator[Executor
 
 @contextmanager
 def cluster(address: str) -> Iterator[Executor]:
-    """The workers of a running Dask scheduler, such as tcp://192.168.1.5:8786; one that dies has its work
-    done by the others.
+    """The workers of a running Dask scheduler; one that dies has its work done by the others.
 
-    Raises InputError where `distributed` is not installed or nobody answers.
+    Args:
+        address: of the scheduler, such as tcp://192.168.1.5:8786.
+    Raises:
+        InputError: `distributed` is not installed, or nobody answers.
     """
     from orthoscope.geometry.arrays import InputError
 
@@ -70,7 +79,7 @@ def cluster(address: str) -> Iterator[Executor]:
             " --cluster."
         ) from error
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=ANSWER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
             f"no Dask scheduler answers at {address!r}; expected one such as tcp://192.168.1.5:8786. Start it"
@@ -87,11 +96,9 @@ def cluster(address: str) -> Iterator[Executor]:
 
 @contextmanager
 def single_threaded() -> Iterator[None]:
-    """Lets numpy compute with one thread where it is not loaded yet: sums then do not depend on the machine's
-    cores.
-    """
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    """Lets numpy, where it is not loaded yet, compute with one thread: sums then do not depend on the cores."""
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:
         yield
     finally:
@@ -104,8 +111,11 @@ def single_threaded() -> Iterator[None]:
 
 @contextmanager
 def _here(executor: Executor, *, then: Callable[[], None] = lambda: None) -> Iterator[Executor]:
-    """An executor of this machine, whose waiting work is dropped when the block is left by an error or a
-    stop, which `then` follows.
+    """An executor of this machine, whose waiting work is dropped when the block is left by an error or a stop.
+
+    Args:
+        executor: the one.
+        then: what is done after the dropping.
     """
     with _stopped_by_sigterm(), executor:
         try:
@@ -145,6 +155,7 @@ def _serve() -> None:
 
 
 def _end_children() -> None:
+    """Ask every process that this one has started to end."""
     import multiprocessing
 
     for child in multiprocessing.active_children():

@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from orthoscope.evaluation.evaluate import Evaluation
     from orthoscope.fitting.calibration import Calibration
 
-__all__ = ["EVALUATION", "judged"]
+__all__ = ["EVALUATION", "judged_calibration"]
 
 EVALUATION = "evaluation.json"  # beside calibration.json
 
 
-def judged(path: Path, *, folds: int | None, jobs: int | None, cluster: str | None) -> Evaluation:
+def judged_calibration(path: Path, *, folds: int | None, jobs: int | None, cluster: str | None) -> Evaluation:
     """The evaluation of a calibration's file.
 
     Args:

@@ -1,4 +1,4 @@
-"""Progress bars on stderr, handed down to the floors below as plain callables."""
+"""Progress bars on stderr, handed down to the rooms below as plain callables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ __all__ = ["bar"]
 
 @contextmanager
 def bar(title: str) -> Iterator[Callable[..., None]]:
-    """A callable (done, total, name...) that draws a bar; silent where stderr is no terminal."""
+    """A callable (done, total, name...) that draws a bar; silent where stderr is no terminal.
+
+    Args:
+        title: what the bar counts.
+    """
     if not sys.stderr.isatty():
         yield lambda done, total, *name: None
         return

@@ -59,7 +59,7 @@ def report(
 ) -> None:
     """Write the report page of a calibration: one HTML file that needs nothing else."""
     from orthoscope.cli.executors import threads
-    from orthoscope.cli.judged import judged
+    from orthoscope.cli.judged import judged_calibration
     from orthoscope.cli.progress import bar
     from orthoscope.files.images import names_of, photographs
     from orthoscope.files.whole_files import check_folder
@@ -71,7 +71,7 @@ def report(
     if figures:
         check_matplotlib()
         check_folder(figures)
-    evaluation = judged(calibration, folds=folds, jobs=jobs, cluster=cluster)
+    evaluation = judged_calibration(calibration, folds=folds, jobs=jobs, cluster=cluster)
     paths = photographs(photos) if photos else []
     files = dict(zip(names_of(paths), paths, strict=True))
     with threads(jobs) as executor, bar("photographs") as progress:

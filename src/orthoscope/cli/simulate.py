@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from orthoscope.cli import options
+
+if TYPE_CHECKING:
+    from orthoscope.models.camera import Camera
+    from orthoscope.simulation.scene import Scene
+    from orthoscope.targets.target import Target
 
 __all__ = ["simulate", "write_photographs"]
 
@@ -131,7 +137,9 @@ def simulate(
         click.echo(f"wrote      {views} photographs into {folder}/")
 
 
-def _camera(source: str | None, lens: str | None, image_size: tuple[int, int] | None, focal: float | None):
+def _camera(
+    source: str | None, lens: str | None, image_size: tuple[int, int] | None, focal: float | None
+) -> Camera:
     """The camera that was asked for: of a file, of a lens, or that of the demo."""
     from orthoscope.formats.load import load_camera
     from orthoscope.geometry.arrays import InputError
@@ -157,21 +165,21 @@ def _camera(source: str | None, lens: str | None, image_size: tuple[int, int] | 
     )
 
 
-def write_photographs(scene, folder: Path, *, seed: int) -> Path:
+def write_photographs(scene: Scene, folder: Path, *, seed: int) -> Path:
     """Render every view of a scene into a folder, as PNG."""
     import numpy as np
 
     from orthoscope.cli.progress import bar
     from orthoscope.files.images import write_image
-    from orthoscope.simulation.render import photographs
+    from orthoscope.simulation.render import rendered_photographs
 
     with bar("rendering") as progress:
-        for done, (name, image) in enumerate(photographs(scene, rng=np.random.default_rng(seed)), 1):
+        for done, (name, image) in enumerate(rendered_photographs(scene, rng=np.random.default_rng(seed)), 1):
             write_image(folder / f"{name}.png", image)
             progress(done, len(scene.camera_from_target), name)
     return folder
 
 
-def _square(target) -> float:
+def _square(target: Target) -> float:
     """The side of a chessboard's square: what it reaches beyond its outer corners."""
     return float(abs(target.points[1] - target.points[0]).max())

@@ -16,7 +16,7 @@ import numpy as np
 from orthoscope.detection.saddle_points import SaddlePoints
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
-__all__ = ["Lattice", "lattices"]
+__all__ = ["CornerLattice", "lattices"]
 
 NEAREST = 16  # corners that may be neighbours
 WIDEST = np.deg2rad(22.0)  # from the edge to the neighbour, and between the edges of both
@@ -24,7 +24,7 @@ LONGEST = 2.5  # the second step in one direction over the first, or the other w
 FEWEST = 4  # corners of a lattice worth telling of
 
 
-class Lattice(NamedTuple):
+class CornerLattice(NamedTuple):
     """Corners that hang together.
 
     Args:
@@ -44,7 +44,7 @@ class Lattice(NamedTuple):
         return int(columns), int(rows)
 
 
-def lattices(points: SaddlePoints) -> list[Lattice]:
+def lattices(points: SaddlePoints) -> list[CornerLattice]:
     """What hangs together, the most corners first."""
     if len(points.pixels) < FEWEST:
         return []
@@ -133,7 +133,7 @@ def _nearest_direction(edges: ndarray, wanted: float) -> float:
     return float(ways[np.cos(ways - wanted).argmax()])
 
 
-def _lattice(points: SaddlePoints, members: ndarray, cells: ndarray) -> Lattice:
+def _lattice(points: SaddlePoints, members: ndarray, cells: ndarray) -> CornerLattice:
     """The lattice, turned so that rows follow columns as y follows x."""
     seed = points.edges[members[0]]
     flipped = np.sin(seed[1] - seed[0]) < 0  # the seed's edges are its directions of columns and rows
@@ -143,4 +143,4 @@ def _lattice(points: SaddlePoints, members: ndarray, cells: ndarray) -> Lattice:
     even = (cells - cells[0]).sum(
         1
     ) % 2 == 0  # the seed's bright square lies from its first edge to its second
-    return Lattice(points.pixels[members], cells, even)
+    return CornerLattice(points.pixels[members], cells, even)

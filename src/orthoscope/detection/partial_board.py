@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.detection.grid import grid_shape, lattice, one_line_more
-from orthoscope.detection.lattices import Lattice
+from orthoscope.detection.lattices import CornerLattice
 from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 
 __all__ = ["Grid", "alternating", "filled", "grid_of", "laid_out", "placements"]
@@ -48,7 +48,7 @@ class Grid(NamedTuple):
     ends: tuple[bool, bool, bool, bool]
 
 
-def laid_out(grey: ndarray, found: Lattice, most: int) -> Grid | None:
+def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
     """The grid of a lattice, cleared, filled and taken as far as it goes; None where nothing is left of it.
 
     Args:
@@ -138,7 +138,7 @@ def _foreseen(grid: ndarray, turn: int) -> list[ndarray]:
     return [np.rot90(part, -turn) for part in (straight, slanted, between)]
 
 
-def _without_strays(found: Lattice) -> Lattice | None:
+def _without_strays(found: CornerLattice) -> CornerLattice | None:
     """The lattice without corners that are off their neighbours' lines, the worst first."""
     pixels, cells, bright = found
     for _ in range(len(pixels)):
@@ -151,7 +151,7 @@ def _without_strays(found: Lattice) -> Lattice | None:
         keep = np.arange(len(pixels)) != worst
         pixels, cells, bright = pixels[keep], cells[keep], bright[keep]
     cells = cells - cells.min(0)
-    return Lattice(pixels, cells, bright)
+    return CornerLattice(pixels, cells, bright)
 
 
 def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:

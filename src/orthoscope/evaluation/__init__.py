@@ -1,0 +1,1 @@
+"""How good a calibration is: metrics, coverage of the frame, the verdict."""

@@ -20,13 +20,18 @@ __all__ = ["held_out_nce", "lateral_errors", "normalised_calibration_error"]
 def normalised_calibration_error(
     estimated: Float[ndarray, "n 3"], observed: Float[ndarray, "n 3"], intrinsics: Intrinsics
 ) -> float:
-    """Mean lateral error over what pixel rounding alone would give; about 1 is as good as digitisation (1 is
-    0.41 px).
+    """Mean lateral error over what pixel rounding alone would give: 1 is 0.41 px, as good as digitisation.
 
-    estimated, observed: (n,3) metres, camera frame, same order, equal depths: estimated by back-projecting
-    the undistorted pixel to the depth of the observed point. Raises InputError where a depth is not positive.
-    Weng, Cohen and Herniou, TPAMI 14(10), 1992; the paper's eq. (11), whose print lacks the square on the
-    depth.
+    Args:
+        estimated: (n,3) metres, camera frame, back-projected from the undistorted pixels to the depths of the
+            observed points.
+        observed: (n,3) metres, camera frame, in the same order.
+        intrinsics: of the camera that saw them.
+    Raises:
+        InputError: a depth is not positive.
+    Source:
+        Weng, Cohen and Herniou, TPAMI 14(10), 1992; the paper's eq. (11), whose print lacks the square on the
+        depth.
     """
     depth = observed[:, 2]
     if not (depth > 0).all():
@@ -45,10 +50,18 @@ def lateral_errors(
     *,
     shape: TargetShape | None = None,
 ) -> tuple[ndarray, ndarray]:
-    """Points as back-projected from the detected pixels and as the poses place them (n,3 each), for NCE.
+    """Points as back-projected from the detected pixels and as the poses place them, for NCE.
 
     Corners that no straight image would hold (WIDEST), or whose pixel no ray reaches, are left out: towards
     90 degrees a lateral error grows without end.
+
+    Args:
+        camera: gives the rays.
+        camera_from_target: the pose of each view.
+        detections: the pixels.
+        shape: of the target.
+    Returns:
+        Estimated and observed points, (n,3) metres each, camera frame.
     """
     points = points_of(detections.target, shape)
     observed = np.concatenate(

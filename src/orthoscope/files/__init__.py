@@ -1,0 +1,1 @@
+"""Images, and files that are written whole or not at all."""

@@ -33,7 +33,8 @@ _INPUTS: set[tuple[int, int]] = set()
 def read_bytes(path: str | Path) -> bytes:
     """All of a file.
 
-    Raises InputError where there is none or it cannot be read.
+    Raises:
+        InputError: there is none, or it cannot be read.
     """
     try:
         return Path(path).read_bytes()
@@ -48,7 +49,8 @@ def read_bytes(path: str | Path) -> bytes:
 def read_text(path: str | Path) -> str:
     """All of a text file (UTF-8, any line ends), lines ending in a line feed.
 
-    Raises InputError where it cannot be read or is no text.
+    Raises:
+        InputError: it cannot be read, or is no text.
     """
     try:
         text = read_bytes(path).decode("utf-8-sig")
@@ -67,7 +69,8 @@ def write_text(path: str | Path, text: str) -> None:
 def write_bytes(path: str | Path, content: bytes) -> None:
     """Replaces a file as a whole; its folder is made where it is missing, a link stays a link.
 
-    Raises InputError where the place cannot be written.
+    Raises:
+        InputError: the place cannot be written.
     """
     try:
         place = Path(os.path.realpath(path))
@@ -91,8 +94,8 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 def check_folder(folder: str | Path) -> None:
     """Says before a long job that its folder could not be written; makes nothing.
 
-    Raises InputError where the folder, or the nearest one above it that exists, is a file or may not be
-    written.
+    Raises:
+        InputError: the folder, or the nearest one above it that exists, is a file or may not be written.
     """
     place = Path(folder).absolute()
     try:
@@ -116,8 +119,7 @@ def check_folder(folder: str | Path) -> None:
 
 @contextmanager
 def keep_inputs(paths: Iterable[str | Path]) -> Iterator[None]:
-    """Within this block `write_bytes` replaces none of these files, by whatever name, unless by the same
-    bytes.
+    """Within this block `write_bytes` replaces none of these files, by any name, unless by the same bytes.
 
     The command line says this of all that it is given to read; a program that saves what it has loaded is
     free to.
@@ -134,7 +136,11 @@ def keep_inputs(paths: Iterable[str | Path]) -> Iterator[None]:
 def check_not_onto(places: Iterable[str | Path], inputs: Iterable[str | Path]) -> None:
     """Says before a job that one of its outputs is one of its inputs, by whatever name.
 
-    Raises InputError, naming it.
+    Args:
+        places: the outputs.
+        inputs: the files that are read.
+    Raises:
+        InputError: one is; it is named.
     """
     known = {identity for path in inputs if (identity := _identity(Path(path)))}
     for place in places:

@@ -1,0 +1,1 @@
+"""What the methods share: observations, reprojection, starts, poses, held-out views."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.observations import Observations
-from orthoscope.fitting.residual_slopes import slopes_of
+from orthoscope.fitting.residual_slopes import residual_slopes
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.target_shape import polynomials
@@ -115,7 +115,7 @@ class _Sums:
         points, free = flat.detections.target.points, flat.uncertainty.names
         observations = Observations.by_corner(flat.detections)
         poses = observations.poses_of(flat.camera_from_target)
-        slopes, residual = slopes_of(observations, flat.camera, poses, points, free, moves=True)
+        slopes, residual = residual_slopes(observations, flat.camera, poses, points, free, moves=True)
         m, p = observations.present.shape
         pose = np.linalg.qr(slopes.pose.transpose(0, 2, 1))[0]
         smooth = polynomials(points, np.ones(p, dtype=bool))

@@ -26,21 +26,28 @@ __all__ = [
     "poses_of_homographies",
 ]
 
-# B as (B11, B12, B22, B13, B23, B33); what each way of narrowing it leaves free
+# The rows of a basis are B, written (B11, B12, B22, B13, B23, B33), of which every allowed one is a sum.
+
+# Any B is allowed.
 GENERAL = np.eye(6)
+# The pixel axes are square to each other.
 NO_SKEW = np.eye(6)[[0, 2, 3, 4, 5]]
+# Besides, the principal point is the image's centre.
 CENTRED = np.eye(6)[[0, 2, 5]]
+# Besides, fx = fy.
 CENTRED_SQUARE = np.array([[1.0, 0, 1, 0, 0, 0], [0, 0, 0, 0, 0, 1]])
 
 
 def intrinsics_of_homographies(
     homographies: Float[ndarray, "m 3 3"], image_size: tuple[int, int], basis: Float[ndarray, "b 6"]
 ) -> Intrinsics | None:
-    """K from pixel homographies, or None where they belong to no real K of this image (noise, distortion,
-    parallel views).
+    """K from homographies to pixels; None where they belong to no real K (noise, distortion, parallel views).
 
-    basis: which B are allowed, rows of (B11, B12, B22, B13, B23, B33): GENERAL, NO_SKEW, CENTRED or
-    CENTRED_SQUARE, in pixels taken from the image's centre.
+    Args:
+        homographies: from the target's plane to pixels, (m,3,3).
+        image_size: (width, height) pixels.
+        basis: which B are allowed, in pixels from the image's centre: GENERAL, NO_SKEW, CENTRED or
+            CENTRED_SQUARE.
     """
     half = 0.5 * max(image_size)
     centre = 0.5 * (np.array(image_size) - 1.0)
@@ -60,10 +67,16 @@ def intrinsics_of_homographies(
 
 
 def poses_of_camera(camera: Camera, observations: Observations, points: Float[ndarray, "p 3"]) -> Poses:
-    """camera_from_target of every row, by the homography from the target's plane to the camera's rays (any
-    lens, past 90 degrees too).
+    """camera_from_target of every row, by the homography from the target's plane to the camera's rays.
 
-    A corner without a ray has no say; NaN poses where a view has fewer than four rays.
+    Any lens will do, past 90 degrees too. A corner without a ray has no say.
+
+    Args:
+        camera: gives the rays.
+        observations: the views, a row each.
+        points: of the target, (p,3) metres.
+    Returns:
+        The poses of the rows, NaN where a view has fewer than four rays.
     """
     m, n = observations.ids.shape
     rays = camera.unproject(observations.pixels().reshape(-1, 2)).reshape(m, n, 3)
@@ -74,8 +87,10 @@ def poses_of_camera(camera: Camera, observations: Observations, points: Float[nd
 
 
 def poses_of_homographies(homographies: Float[ndarray, "m 3 3"]) -> Poses:
-    """camera_from_target of homographies from the target's plane to rays, known up to a positive factor:
-    Zhang's section 3.1.
+    """camera_from_target of homographies from the target's plane to rays, known up to a positive factor.
+
+    Source:
+        Zhang's section 3.1.
     """
     H = homographies * (2.0 / np.sqrt((homographies[:, :, :2] ** 2).sum(1)).sum(1))[:, None, None]
     axes = np.concatenate([H[:, :, :2], np.cross(H[:, :, 0], H[:, :, 1])[:, :, None]], axis=2)
@@ -98,7 +113,15 @@ def _conic_row(a: ndarray, b: ndarray) -> ndarray:
 
 
 def _intrinsics_of_conic(b: ndarray, half: float, centre: ndarray) -> Intrinsics | None:
-    """Zhang's appendix B, back in pixels."""
+    """K of B, back in pixels, or None where B belongs to no real K.
+
+    Args:
+        b: (B11, B12, B22, B13, B23, B33), in half image sides from the centre.
+        half: of the image's longer side, pixels.
+        centre: of the image, pixels.
+    Source:
+        Zhang's appendix B.
+    """
     B11, B12, B22, B13, B23, B33 = b
     minor = B11 * B22 - B12**2
     if not (B11 > 0 and minor > 0):

@@ -28,8 +28,13 @@ PARALLEL = np.deg2rad(10.0)  # targets that are turned against the first by less
 
 
 def check_enough(used: Detections, free: Sequence[str]) -> None:
-    """Raises CalibrationError where there are more unknowns than measured numbers. free: parameters of the
-    camera.
+    """Says where there are more unknowns than measured numbers.
+
+    Args:
+        used: what was found.
+        free: parameters of the camera.
+    Raises:
+        CalibrationError: there are.
     """
     measured, unknowns = 2 * used.corners, len(free) + 6 * len(used.views)
     if measured < unknowns:
@@ -43,8 +48,15 @@ def check_enough(used: Detections, free: Sequence[str]) -> None:
 def check_known(
     solution: Solution[Estimate], free: Sequence[str], covariance: Float[ndarray, "k k"], used: Detections
 ) -> None:
-    """Raises CalibrationError where the views leave the scale at the image's centre open. covariance: of the
-    free parameters.
+    """Says where the views leave the scale at the image's centre open.
+
+    Args:
+        solution: what was found.
+        free: parameters of the camera.
+        covariance: of the free parameters.
+        used: the views.
+    Raises:
+        CalibrationError: they do.
     """
     camera, poses = solution.unknowns
     variance = solution.cost / max(2 * used.corners - len(free) - 6 * len(used.views), 1)

@@ -32,8 +32,12 @@ Moved = Callable[[Camera, Sequence[str], Float[ndarray, " k"]], Camera]
 class Pairs:
     """The problem: |camera(ray) - pixel|, over the free parameters of the camera.
 
-    rays: (n,3), any length. columns: d(u, v) by the free parameters, and (u, v). moved: the camera after a
-    step of them.
+    Args:
+        rays: (n,3), of any length.
+        pixels: where they are to fall, (n,2).
+        free: the parameters that move.
+        columns: d(u, v) by the free parameters, and (u, v).
+        moved: the camera after a step of them.
     """
 
     def __init__(
@@ -75,8 +79,13 @@ class Pairs:
 def fit_lens(
     rays: Float[ndarray, "n 3"], pixels: Float[ndarray, "n 2"], start: Camera, free: Sequence[str]
 ) -> Solution[Camera]:
-    """The camera near `start` that best takes each ray to its pixel, by least squares in pixels over the free
-    parameters of K and lens.
+    """The camera that best takes each ray to its pixel, by least squares in pixels.
+
+    Args:
+        rays: (n,3), of any length.
+        pixels: where they are to fall, (n,2).
+        start: a camera near the one that is sought.
+        free: parameters of K and lens that move.
     """
     return solve(about_principal_point(rays, pixels, free), start)
 
@@ -86,8 +95,13 @@ def converted(
 ) -> Camera:
     """The camera with another lens formula, nearest in pixels to the first over the given rays.
 
-    free: parameters of K and the lens that move; by default FOCAL and what the formula frees.
-    Raises CalibrationError where the formula cannot see these rays.
+    Args:
+        camera: the first.
+        lens: the other formula.
+        rays: (n,3), of any length.
+        free: parameters of K and the lens that move; by default FOCAL and what the formula frees.
+    Raises:
+        CalibrationError: the formula cannot see these rays.
     """
     starts = [replace(camera, lens=lens(**coefficients)) for coefficients in lens.starts]
     return fit_pairs(
@@ -100,7 +114,8 @@ def fit_pairs(
 ) -> Solution[Camera]:
     """The fit with the lowest cost from any of the starts: some formulas have more than one minimum.
 
-    Raises CalibrationError where the formula cannot see the rays.
+    Raises:
+        CalibrationError: the formula cannot see the rays.
     """
     solutions = [solve(problem, start, loss=loss, options=options) for start in starts]
     usable = [solution for solution in solutions if solution.status is not Status.NO_COST]
@@ -117,17 +132,23 @@ def fit_pairs(
 def about_principal_point(
     rays: Float[ndarray, "n 3"], pixels: Float[ndarray, "n 2"], free: Sequence[str]
 ) -> Pairs:
-    """The problem of a camera whose lens stands about the principal point: free are parameters of K and
-    coefficients.
+    """The problem of a camera whose lens stands about the principal point.
+
+    Args:
+        rays: (n,3), of any length.
+        pixels: where they are to fall, (n,2).
+        free: parameters of K and coefficients of the lens.
     """
 
     parameters = Parameters.of(free)
 
-    def columns(camera, rays, _):
+    def columns(
+        camera: Camera, rays: Float[ndarray, "n 3"], _: Sequence[str]
+    ) -> tuple[Float[ndarray, "k 2 n"], Float[ndarray, "2 n"]]:
         image = camera.linearise(rays.T, parameters)
         return image.by_parameters(), np.stack([image.u, image.v])
 
-    def moved(camera, _, step):
+    def moved(camera: Camera, _: Sequence[str], step: Float[ndarray, " k"]) -> Camera:
         return parameters.moved(camera, step)
 
     return Pairs(rays, pixels, parameters.names, columns=columns, moved=moved)

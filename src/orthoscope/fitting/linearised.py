@@ -27,14 +27,14 @@ from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.solve.least_squares import NormalEquations
 
-__all__ = ["Linearised", "Slopes"]
+__all__ = ["Linearised", "ResidualSlopes"]
 
 ROUNDING = 1e-13  # of a scaled system: what is added to its diagonal before it is inverted
 SPACE = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Slopes:
+class ResidualSlopes:
     """How the residuals of m views of p corners move, not weighted; 0 where a corner was not seen.
 
     Args:
@@ -81,7 +81,7 @@ class Linearised:
 
     camera: Camera
     names: tuple[str, ...]
-    slopes: Slopes
+    slopes: ResidualSlopes
     single: bool
     residual: Float[ndarray, "m n"]
     root: Float[ndarray, "m n"]

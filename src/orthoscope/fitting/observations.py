@@ -1,5 +1,4 @@
-"""Detections as the mathematics wants them: one padded table, views with most corners first, and the poses
-beside it.
+"""Detections as the mathematics wants them: one padded table, fullest views first, and the poses beside it.
 
 Rows are views, columns corners; `present` marks the padding. Row r is view `order[r]` of the detections.
 Sorted rows let a chunk of consecutive views be cut to its own width, so partial boards cost little more than
@@ -20,13 +19,17 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Observations", "Poses"]
 
-CHUNK = (
-    8192  # corners that are linearised together: their intermediate arrays then stay in the processor's cache
-)
+# So many corners are linearised together: their intermediate arrays then stay in the processor's cache.
+CORNERS_AT_ONCE = 8192
 
 
 class Poses(NamedTuple):
-    """camera_from_target of all views: rotation (m,3,3), translation (m,3)."""
+    """camera_from_target of all views.
+
+    Attributes:
+        rotation: (m,3,3).
+        translation: (m,3) metres.
+    """
 
     rotation: ndarray
     translation: ndarray
@@ -37,18 +40,35 @@ class Poses(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """Consecutive rows of the table, cut to their own width."""
+    """Consecutive rows of the table, cut to their own width.
+
+    Attributes:
+        rows: which of the table's.
+        ids: of the corners, (c,n).
+        u: their pixels' x, (c,n).
+        v: their pixels' y, (c,n).
+        present: 1 for a corner, 0 for padding, (c,n); None where no corner is missing.
+    """
 
     rows: slice
-    ids: ndarray  # (c, n)
+    ids: ndarray
     u: ndarray
     v: ndarray
-    present: ndarray | None  # (c, n) of 0 and 1; None where no corner is missing
+    present: ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """order: (m,).  counts: (m,).  ids, u, v, present: (m, n), 0 where there is no corner."""
+    """The table; 0 where there is no corner.
+
+    Attributes:
+        order: which view of the detections each row is, (m,).
+        counts: how many corners each row has, (m,).
+        ids: of the corners, (m,n).
+        u: their pixels' x, (m,n).
+        v: their pixels' y, (m,n).
+        present: 1 for a corner, 0 for padding, (m,n).
+    """
 
     order: Int[ndarray, " m"]
     counts: Int[ndarray, " m"]
@@ -73,8 +93,9 @@ class Observations:
 
     @classmethod
     def by_corner(cls, detections: Detections) -> Observations:
-        """The table with a column for each of the target's corners, views in their own order: sums over views
-        are then sums of columns.
+        """The table with a column for each of the target's corners, views in their own order.
+
+        Sums over views are then sums of columns.
         """
         views, corners = len(detections.views), len(detections.target.points)
         seen = np.zeros((3, views, corners))
@@ -93,7 +114,7 @@ class Observations:
         return np.stack([self.u, self.v], axis=-1)
 
     def evenly(self, views: int) -> Int[ndarray, " v"]:
-        """At most so many rows, evenly picked."""
+        """The numbers of at most so many rows, evenly picked."""
         return np.unique(np.linspace(0, len(self.order) - 1, views).round().astype(int))
 
     def only(self, rows: Int[ndarray, " v"]) -> Observations:
@@ -104,8 +125,9 @@ class Observations:
         )
 
     def thinned(self, corners: int) -> Observations:
-        """The same rows with at most so many corners each: the first in one shuffled order, the same every
-        time.
+        """The table of the same rows with at most so many corners each.
+
+        They are the first in one shuffled order, the same every time.
         """
         if self.counts.max(initial=0) <= corners:
             return self
@@ -115,11 +137,11 @@ class Observations:
         return Observations(self.order, np.minimum(self.counts, corners), *table)
 
     def chunks(self) -> list[Chunk]:
-        """The table in pieces of about CHUNK corners."""
+        """The table in pieces of about CORNERS_AT_ONCE corners."""
         pieces, start = [], 0
         while start < len(self.order):
             width = int(self.counts[start])
-            stop = min(len(self.order), start + max(1, CHUNK // max(width, 1)))
+            stop = min(len(self.order), start + max(1, CORNERS_AT_ONCE // max(width, 1)))
             rows = slice(start, stop)
             ids, u, v, present = (np.ascontiguousarray(array[rows, :width]) for array in self._columns())
             pieces.append(Chunk(rows, ids, u, v, None if present.all() else present))
@@ -147,8 +169,9 @@ class Observations:
 
 
 def _trusted(rotation: Float[ndarray, "3 3"], translation: Float[ndarray, "3"]) -> Pose:
-    """A pose without its check, which made one by one took a tenth of a calibration of 1000 views; these
-    rotations are orthonormal.
+    """A pose without its check, since these rotations are orthonormal.
+
+    Checking them one by one took a tenth of a calibration of 1000 views.
     """
     pose = object.__new__(Pose)
     pose.__dict__.update(rotation=rotation, translation=translation)

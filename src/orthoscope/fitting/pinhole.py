@@ -22,7 +22,8 @@ __all__ = ["fit_pinhole", "pinhole_start"]
 def pinhole_start(bases: StartingCameras) -> Estimate:
     """Zhang's closed form; where these corners have none, the K of a lens that was fitted to them.
 
-    Raises CalibrationError where the corners fit no camera.
+    Raises:
+        CalibrationError: the corners fit no camera.
     """
     if bases.pinhole is not None:
         return bases.pinhole
@@ -34,8 +35,9 @@ def fit_pinhole(
 ) -> Solution[Estimate]:
     """The K and poses that minimise eq. (4), the parameters of K free that the views can tell.
 
-    Raises CalibrationError where no pin-hole sees the target as it is in the views, or they leave its focal
-    length open.
+    Raises:
+        CalibrationError: no pin-hole sees the target as it is in the views, or they leave its focal length
+            open.
     """
     start = pinhole_start(bases)
     problem = Reprojection(bases.observations, bases.points, start.camera, bases.narrowing.free)

@@ -27,10 +27,15 @@ __all__ = ["resect"]
 def resect(
     camera: Camera, detections: Detections, *, shape: TargetShape | None = None, loss: Loss | None = None
 ) -> tuple[Pose, ...]:
-    """camera_from_target of each view, by least squares over its corners with the camera (and the target's
-    shape) fixed.
+    """camera_from_target of each view, by least squares over its corners, the camera being fixed.
 
-    Raises CalibrationError where a view has fewer than four corners inside the lens's domain.
+    Args:
+        camera: which took the photographs.
+        detections: what was found in them.
+        shape: of the target, fixed too; flat by default.
+        loss: what a squared residual costs; least squares by default.
+    Raises:
+        CalibrationError: a view has fewer than four corners inside the lens's domain.
     """
     observations = Observations.of(detections)
     poses = poses_of_camera(camera, observations, detections.target.points)

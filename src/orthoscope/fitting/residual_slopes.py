@@ -10,19 +10,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orthoscope.fitting.linearised import Slopes
+from orthoscope.fitting.linearised import ResidualSlopes
 from orthoscope.fitting.observations import Observations, Poses
 from orthoscope.fitting.reprojection import POSE, Estimate, Places, Reprojection
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
 
-__all__ = ["by_corner", "slopes_of", "spline_values"]
+__all__ = ["by_corner", "residual_slopes", "spline_values"]
 
 SPACE = 3
 
 
-def slopes_of(
+def residual_slopes(
     observations: Observations,
     camera: Camera,
     poses: Poses,
@@ -30,7 +30,7 @@ def slopes_of(
     free: Sequence[str],
     *,
     moves: bool,
-) -> tuple[Slopes, Float[ndarray, "m n"]]:
+) -> tuple[ResidualSlopes, Float[ndarray, "m n"]]:
     """The slopes at a camera and poses, without a surface, and the residuals (m,2p).
 
     Args:
@@ -59,7 +59,7 @@ def slopes_of(
     frame = camera.lens_frame or camera.intrinsics
     of_spline *= observations.present[:, :, None]
     surface = np.zeros((p, 0))
-    return Slopes(of_camera, of_pose, of_spline, of_corner, surface, frame.matrix[:2, :2]), residual
+    return ResidualSlopes(of_camera, of_pose, of_spline, of_corner, surface, frame.matrix[:2, :2]), residual
 
 
 def by_corner(

@@ -18,22 +18,23 @@ from orthoscope.targets.detections import Detections, SetAside, View
 
 __all__ = ["with_usable_views"]
 
-FEWEST = 4  # corners that a homography needs
-THINNEST = 0.01  # of a view's length in the image is its width at least
+# A homography needs this many corners.
+FEWEST_CORNERS = 4
+# The width of a view in the image is at least this share of its length.
+LEAST_WIDTH_SHARE = 0.01
 
 
 def with_usable_views(detections: Detections) -> Detections:
-    """The detections without the views that tell nothing or tell it twice; those are set aside with the
-    reason.
+    """The detections; views that tell nothing or tell it twice are set aside with the reason.
 
-    Raises CalibrationError where no view is left.
+    Raises:
+        CalibrationError: no view is left.
     """
     kept: list[View] = []
     aside: list[SetAside] = list(detections.set_aside)
     seen: dict[bytes, str] = {}
-    off_a_line = cache(
-        lambda ids: _off_a_line(detections.target.points[np.frombuffer(ids, np.int64), :2])
-    )  # most boards are whole, and alike
+    # Most boards are whole, and alike.
+    off_a_line = cache(lambda ids: _off_a_line(detections.target.points[np.frombuffer(ids, np.int64), :2]))
     for view in detections.views:
         content = view.ids.tobytes() + view.pixels.tobytes()
         if reason := _fault(view, off_a_line):
@@ -53,9 +54,14 @@ def with_usable_views(detections: Detections) -> Detections:
 
 
 def _fault(view: View, off_a_line: Callable[[bytes], int]) -> str | None:
-    """Why a view tells nothing; None where it does.  off_a_line: of the ids of its corners."""
-    if len(view.ids) < FEWEST:
-        return f"{len(view.ids)} corners; a view needs {FEWEST}"
+    """Why a view tells nothing; None where it tells something.
+
+    Args:
+        view: the one in question.
+        off_a_line: `_off_a_line` of the points whose ids, as bytes, it is given.
+    """
+    if len(view.ids) < FEWEST_CORNERS:
+        return f"{len(view.ids)} corners; a view needs {FEWEST_CORNERS}"
     off = off_a_line(view.ids.tobytes())
     if off < 2:
         return f"all its corners{' but one' if off else ''} are on one line of the target"
@@ -65,15 +71,10 @@ def _fault(view: View, off_a_line: Callable[[bytes], int]) -> str | None:
 
 
 def _off_a_line(points: Float[ndarray, "n 2"]) -> int:
-    """How many points are off the line that has most of them, where that is none or one; else more
-    than one.
-    """
+    """How many points are off the line that has most of them, if that is none or one; else more than one."""
     fewest = len(points)
-    for a, b in (
-        (0, 1),
-        (0, 2),
-        (1, 2),
-    ):  # a line that misses one point at most goes through two of the first three
+    # A line that misses one point at most goes through two of the first three.
+    for a, b in ((0, 1), (0, 2), (1, 2)):
         (along_x, along_y), (x, y) = points[b] - points[a], (points - points[a]).T
         if along_x or along_y:
             off = np.abs(along_x * y - along_y * x) > 1e-9 * (x * x + y * y).max()
@@ -85,7 +86,6 @@ def _thin(pixels: Float[ndarray, "n 2"]) -> bool:
     """Whether pixels are all but on a line, or all at one place."""
     offsets = pixels - pixels.sum(0) / len(pixels)
     (xx, xy), (_, yy) = (offsets.T @ offsets).tolist()
-    longest = 0.5 * (xx + yy) + hypot(
-        0.5 * (xx - yy), xy
-    )  # the larger eigenvalue; their product is the determinant
-    return xx * yy - xy * xy <= THINNEST**2 * longest * longest
+    # This is the larger eigenvalue; the product of both is the determinant.
+    longest = 0.5 * (xx + yy) + hypot(0.5 * (xx - yy), xy)
+    return xx * yy - xy * xy <= LEAST_WIDTH_SHARE**2 * longest * longest

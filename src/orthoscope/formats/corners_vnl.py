@@ -51,10 +51,15 @@ class _Table(NamedTuple):
 
 
 def read_vnl(path: str | Path, target: Target, image_size: tuple[int, int]) -> Detections:
-    """The corners of a corners.vnl file as detections of `target` in images of image_size (width, height).
+    """The corners of a corners.vnl file as detections.
 
-    Raises InputError, with the line, where the table is none, an image has another number of corners than the
-    target or is there twice, and where a corner lies outside the image.
+    Args:
+        path: of the file.
+        target: whose corners they are.
+        image_size: of the photographs, (width, height) pixels.
+    Raises:
+        InputError: the table is none, an image has another number of corners than the target or is there
+            twice, or a corner lies outside the image; the line is named.
     """
     table = _table(read_text(path), path)
     starts = [0, *compress(count(1), map(ne, table.images, table.images[1:]))]
@@ -80,7 +85,8 @@ def read_vnl(path: str | Path, target: Target, image_size: tuple[int, int]) -> D
 def write_vnl(detections: Detections, path: str | Path) -> None:
     """Writes detections as a corners.vnl file that mrcal reads, every number to its last digit.
 
-    Raises InputError for an image name that such a table cannot hold, and where the file cannot be written.
+    Raises:
+        InputError: an image name that such a table cannot hold, or the file cannot be written.
     """
     lines = ["# " + " ".join(LEGEND)]
     for view in detections.views:

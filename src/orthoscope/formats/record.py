@@ -20,7 +20,7 @@ import numpy as np
 from orthoscope.formats.syntax import Document
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import Camera
+from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Lens
 from orthoscope.models.lenses import FREE, LENSES, lens_name
@@ -196,10 +196,11 @@ def shifted(camera: Camera, by: float) -> Camera:
     if by == 0.0:
         return camera
 
-    def moved(intrinsics):
-        return intrinsics and replace(intrinsics, cx=intrinsics.cx + by, cy=intrinsics.cy + by)
+    def moved(intrinsics: Intrinsics) -> Intrinsics:
+        return replace(intrinsics, cx=intrinsics.cx + by, cy=intrinsics.cy + by)
 
-    return replace(camera, intrinsics=moved(camera.intrinsics), lens_frame=moved(camera.lens_frame))
+    frame = camera.lens_frame
+    return replace(camera, intrinsics=moved(camera.intrinsics), lens_frame=frame and moved(frame))
 
 
 def share_beyond(camera: Camera, farthest_deg: float) -> float:

@@ -1,0 +1,1 @@
+"""Arrays, poses, homographies, cells of a frame, numbers as text."""

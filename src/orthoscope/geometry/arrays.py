@@ -17,7 +17,7 @@ if TYPE_CHECKING or "jaxtyping" in sys.modules:
 else:
 
     class _PlainArray:
-        def __class_getitem__(cls, _):
+        def __class_getitem__(cls, _: str) -> type[ndarray]:
             return ndarray
 
     Bool = Float = Int = _PlainArray
@@ -34,9 +34,15 @@ class CalibrationError(RuntimeError):
 
 
 def frozen(values: Any, shape: tuple[int | None, ...], name: str, dtype: type = np.float64) -> ndarray:
-    """A read-only copy of `values` with the given shape (None is any length) and only finite numbers.
+    """A read-only copy of `values` that has the wanted shape and finite numbers only.
 
-    Raises InputError where the shape differs or a value is NaN or infinite.
+    Args:
+        values: anything that numpy makes an array of.
+        shape: the wanted one; None stands for any length.
+        name: what the values are called in a message.
+        dtype: of the copy.
+    Raises:
+        InputError: the shape is another, or a value is NaN, infinite or no number.
     """
     try:
         array = np.array(values, dtype=dtype)

@@ -13,12 +13,16 @@ from orthoscope.geometry.arrays import Float, Int, ndarray
 
 __all__ = ["Cells", "cells_for"]
 
-__all__ = ["Cells", "cells_for"]
-
 
 @dataclass(frozen=True)
 class Cells:
-    """columns x rows cells of one size over a frame of image_size (width, height) pixels, edges included."""
+    """Cells of one size over the whole frame, edges included.
+
+    Attributes:
+        image_size: (width, height) pixels.
+        columns: how many cells stand side by side.
+        rows: how many stand one above the other.
+    """
 
     image_size: tuple[int, int]
     columns: int
@@ -41,9 +45,7 @@ class Cells:
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     def of(self, pixels: Float[ndarray, "n 2"]) -> Int[ndarray, " n"]:
-        """The cell's number for each pixel, row by row; what lies outside the frame goes to the nearest
-        cell.
-        """
+        """The number of each pixel's cell, row by row; outside the frame that of the nearest cell."""
         counts = np.array([self.columns, self.rows])
         cell = np.floor((pixels + 0.5) / np.array(self.image_size) * counts).astype(np.int64)
         cell = np.clip(cell, 0, counts - 1)
@@ -58,7 +60,12 @@ class Cells:
     def mean(
         self, pixels: Float[ndarray, "n 2"], values: Float[ndarray, " n"]
     ) -> Float[ndarray, "rows columns"]:
-        """The mean of the values in each cell; NaN where there are none."""
+        """The mean of the values in each cell; NaN where there are none.
+
+        Args:
+            pixels: where the values are, (n,2).
+            values: one for each pixel.
+        """
         total = np.bincount(self.of(pixels), weights=values, minlength=self.rows * self.columns).reshape(
             self.rows, self.columns
         )
@@ -67,7 +74,7 @@ class Cells:
 
 
 def cells_for(image_size: tuple[int, int], wanted: int) -> Cells:
-    """About `wanted` nearly square cells."""
+    """About `wanted` nearly square cells over a frame of image_size (width, height) pixels."""
     width, height = image_size
     columns = max(1, round(np.sqrt(wanted * width / height)))
     return Cells(image_size, columns, max(1, round(columns * height / width)))

@@ -21,17 +21,21 @@ __all__ = [
     "vector_from_rotation",
 ]
 
-CROSS = np.array(
+# Row i is the flattened cross-product matrix [e_i]_x of the i-th axis.
+CROSS_OF_AXES = np.array(
     [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=float
-)  # [e_i]_x, flat
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
     """A rigid motion, named `a_from_b`: it takes points of frame b to frame a.
 
-    rotation: (3,3) orthonormal, determinant +1.  translation: (3,) metres.
-    Raises InputError where the rotation is not one (to 1e-6).
+    Attributes:
+        rotation: (3,3), orthonormal, determinant +1.
+        translation: (3,) metres.
+    Raises:
+        InputError: the rotation is not one (to 1e-6).
     """
 
     rotation: ndarray
@@ -57,13 +61,15 @@ class Pose:
         return Pose(self.rotation.T, -self.rotation.T @ self.translation)
 
     def apply(self, points: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
-        """Points (n,3) of frame b, metres, in frame a."""
+        """Points of frame b, (n,3) metres, as points of frame a."""
         return points @ self.rotation.T + self.translation
 
 
 def rotation_from_vector(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3 3"]:
-    """Rodrigues: rotation matrices of rotation vectors (radians): I + sin(a)/a [v]_x + (1 - cos a)/a^2
-    [v]_x^2, a = |v|.
+    """Rotation matrices of rotation v, radians: I + sin(a)/a [v]_x + (1 - cos a)/a^2 [v]_x^2, a = |v|.
+
+    Source:
+        O. Rodrigues, Journal de mathematiques pures et appliquees 5, 1840.
     """
     angle = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
     cross = cross_matrix(vectors)
@@ -75,16 +81,18 @@ def rotation_from_vector(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, 
 
 
 def vector_from_rotation(rotation: Float[ndarray, "3 3"]) -> Float[ndarray, "3"]:
-    """The rotation vector, length in [0, pi], of one rotation matrix; by way of the unit quaternion, stable
-    at pi.
-    """
+    """The rotation vector of one matrix, its length in [0, pi]; by the unit quaternion, so stable at pi."""
     w, axis = _quaternion(rotation)
     sine = np.linalg.norm(axis)
     return (2.0 if sine < 1e-12 else 2.0 * np.arctan2(sine, w) / sine) * axis
 
 
 def nearest_rotation(matrices: Float[ndarray, "*batch 3 3"]) -> Float[ndarray, "*batch 3 3"]:
-    """The rotation nearest to each matrix in the Frobenius norm (Kabsch)."""
+    """The rotation nearest to each matrix in the Frobenius norm.
+
+    Source:
+        W. Kabsch, A solution for the best rotation to relate two sets of vectors, Acta Cryst. A32, 1976.
+    """
     left, _, right = np.linalg.svd(matrices)
     left[..., :, 2] *= np.linalg.det(left @ right)[..., None]
     return left @ right
@@ -110,11 +118,15 @@ def rotation_from_quaternion(quaternion: Float[ndarray, "4"]) -> Float[ndarray, 
 
 def cross_matrix(vectors: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 3 3"]:
     """[v]_x, so that [v]_x u = v x u."""
-    return (vectors @ CROSS).reshape(*vectors.shape[:-1], 3, 3)
+    return (vectors @ CROSS_OF_AXES).reshape(*vectors.shape[:-1], 3, 3)
 
 
 def _quaternion(rotation: Float[ndarray, "3 3"]) -> tuple[float, Float[ndarray, "3"]]:
-    """(w, axis) with w >= 0: the eigenvector of the largest eigenvalue of Bar-Itzhack's matrix."""
+    """The unit quaternion (w, axis) with w >= 0: last eigenvector of Bar-Itzhack's matrix.
+
+    Source:
+        I. Bar-Itzhack, New method for extracting the quaternion from a rotation matrix, JGCD 23(6), 2000.
+    """
     m = rotation
     k = np.empty((4, 4))
     k[:3, :3] = m + m.T - np.trace(m) * np.eye(3)

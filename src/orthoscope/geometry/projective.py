@@ -28,18 +28,21 @@ __all__ = [
     "homographies_to_rays",
 ]
 
-SYMMETRIC = np.array(
-    [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
-)  # where the entries of a symmetric 3x3 matrix stand among its six
-VIEWS_AT_ONCE = 15  # so that the intermediate arrays stay in the processor's cache
+# Where each entry of a symmetric 3x3 matrix stands among its six different ones.
+SYMMETRIC_PLACES = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+# So many views are done together, so that the intermediate arrays stay in the processor's cache.
+VIEWS_AT_ONCE = 15
 
 
 def homographies_to_rays(
     points: Float[ndarray, "v n 2"], rays: Float[ndarray, "v n 3"], weights: Float[ndarray, "v n"]
 ) -> Float[ndarray, "v 3 3"]:
-    """H of each view with H (X, Y, 1) along the ray, scaled to |H| = 1 and to point forward along its rays.
+    """H of each view, H (X, Y, 1) along the ray, scaled to |H| = 1 and to point forward along its rays.
 
-    points: target plane, metres.  rays: any length.  weights: 0 where there is no corner.
+    Args:
+        points: of the target's plane, (v,n,2) metres.
+        rays: of these points, (v,n,3), any length.
+        weights: (v,n), 0 where there is no corner.
     """
     h = np.empty((len(points), 3, 3))
     for start in range(0, len(points), VIEWS_AT_ONCE):
@@ -49,8 +52,9 @@ def homographies_to_rays(
 
 
 def _homographies(points: ndarray, rays: ndarray, weights: ndarray) -> ndarray:
-    """`homographies_to_rays` of some views, not scaled; both factors of the normal matrix are symmetric, so
-    six sums stand for nine.
+    """H of each of some views up to a positive factor, its parameters as those of `homographies_to_rays`.
+
+    Both factors of the normal matrix are symmetric, so six sums stand for nine.
     """
     normalised, plane_from_target = _hartley(points, weights)
     (X, Y), (x, y, z) = np.moveaxis(normalised, -1, 0), np.moveaxis(rays, -1, 0)
@@ -61,7 +65,7 @@ def _homographies(points: ndarray, rays: ndarray, weights: ndarray) -> ndarray:
         * weights[:, None]
     )
     sums = rr @ pp.transpose(0, 2, 1)
-    normal = sums[:, SYMMETRIC[:, None, :, None], SYMMETRIC[None, :, None, :]].reshape(-1, 9, 9)
+    normal = sums[:, SYMMETRIC_PLACES[:, None, :, None], SYMMETRIC_PLACES[None, :, None, :]].reshape(-1, 9, 9)
     h = np.linalg.eigh(normal)[1][:, :, 0].reshape(-1, 3, 3)
     forward = ((h @ np.stack([X, Y, one], axis=1)) * np.stack([x, y, z], axis=1)).sum(1)
     return h * np.where((weights * forward).sum(-1) < 0, -1.0, 1.0)[:, None, None] @ plane_from_target
@@ -70,8 +74,12 @@ def _homographies(points: ndarray, rays: ndarray, weights: ndarray) -> ndarray:
 def homographies_to_pixels(
     points: Float[ndarray, "v n 2"], pixels: Float[ndarray, "v n 2"], weights: Float[ndarray, "v n"]
 ) -> Float[ndarray, "v 3 3"]:
-    """H of each view from the target's plane (metres) to pixels, scaled to |H| = 1, third coordinate
-    positive.
+    """H of each view from the target's plane to pixels, scaled to |H| = 1, third coordinate positive.
+
+    Args:
+        points: of the target's plane, (v,n,2) metres.
+        pixels: of these points, (v,n,2).
+        weights: (v,n), 0 where there is no corner.
     """
     normalised, plane_from_pixels = _hartley(pixels, weights)
     rays = np.concatenate([normalised, np.ones_like(normalised[..., :1])], axis=-1)
@@ -80,11 +88,14 @@ def homographies_to_pixels(
 
 
 class FittedLines(NamedTuple):
-    """The line nearest to each set of points: through `middle` along the unit vector `direction`.
+    """The line nearest to each set of points, through `middle` along the unit vector `direction`.
 
-    along, across: place of each point on the line and its signed distance from it, to the side of
-    (-direction_y, direction_x). gap: the difference of the two sums of squares; 0 where the points have no
-    direction.
+    Attributes:
+        middle: (...,2), the mean of the points.
+        direction: (...,2), a unit vector.
+        along: (...,n), the place of each point on the line, from its middle.
+        across: (...,n), each one's signed distance from the line, to the side of (-direction_y, direction_x).
+        gap: (...), the sum of squares along the line less that across it; 0 for points without a direction.
     """
 
     middle: Float[ndarray, "*batch 2"]
@@ -95,8 +106,11 @@ class FittedLines(NamedTuple):
 
 
 def fitted_lines(points: Float[ndarray, "*batch n 2"], weights: Float[ndarray, "*batch n"]) -> FittedLines:
-    """The line with the least sum of squared distances from its points, for every set of the stack; weight 0
-    marks padding.
+    """The line with the least sum of squared distances from its points, for every set of the stack.
+
+    Args:
+        points: (...,n,2).
+        weights: (...,n), 0 where there is no point.
     """
     middle = (weights[..., None] * points).sum(-2) / weights.sum(-1)[..., None]
     x, y = np.moveaxis(points - middle[..., None, :], -1, 0)
@@ -108,7 +122,7 @@ def fitted_lines(points: Float[ndarray, "*batch n 2"], weights: Float[ndarray, "
 
 
 def cross_ratio(points: Float[ndarray, "*batch 4 2"]) -> Float[ndarray, "*batch"]:
-    """CR of four points in their order along a line."""
+    """The cross-ratio of four points in their order along a line, as in the module's docstring."""
     return (
         _distance(points, 0, 2)
         * _distance(points, 1, 3)
@@ -117,8 +131,9 @@ def cross_ratio(points: Float[ndarray, "*batch 4 2"]) -> Float[ndarray, "*batch"
 
 
 def cross_ratio_slope(points: Float[ndarray, "*batch 4 2"]) -> Float[ndarray, "*batch 4 2"]:
-    """Derivative of `cross_ratio` by each coordinate; as a formula of distances it goes on where the points
-    leave their line.
+    """Derivative of `cross_ratio` by each coordinate of its four points.
+
+    As a formula of distances it goes on where the points leave their line.
     """
     slope = np.zeros_like(points)
     for i, j, sign in ((0, 2, 1.0), (1, 3, 1.0), (0, 3, -1.0), (1, 2, -1.0)):

@@ -1,0 +1,1 @@
+"""Lenses, cameras, the target's shape."""

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
-from orthoscope.models.chunks import in_blocks
+from orthoscope.geometry.arrays import Bool, Float, InputError, frozen, ndarray
+from orthoscope.models.chunks import in_chunks
 from orthoscope.models.decentred_lenses import Brown
 from orthoscope.models.lens import Lens
 from orthoscope.models.opencv_order import opencv_distortion
@@ -186,7 +186,7 @@ class Camera:
     def _rays(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Unit rays of pixels."""
         frame = self.lens_frame or self.intrinsics
-        rays = in_blocks(
+        rays = in_chunks(
             lambda u, v: self.lens.chart.lift(*self.lens.unwarp(*frame.place(u, v))), pixels, width=3
         )
         if self.lens_frame is None:
@@ -282,10 +282,10 @@ class Camera:
         frame = self.lens_frame or self.intrinsics
         seen = (straight or self.intrinsics).after(self.intrinsics, frame)
 
-        def straighten(u, v):
+        def straighten(u: ndarray, v: ndarray) -> ndarray:
             return np.stack(seen.pixel(*self.lens.chart.flat(*self.lens.unwarp(*frame.place(u, v)))), axis=-1)
 
-        return in_blocks(straighten, pixels, width=2)
+        return in_chunks(straighten, pixels, width=2)
 
     def distort_pixels(
         self, pixels: Float[ndarray, "n 2"], straight: Intrinsics | None = None
@@ -325,7 +325,7 @@ class Camera:
         """
         size, pin_hole = size or self.image_size, straight or self.intrinsics
 
-        def sees_all_up_to(pixels):
+        def sees_all_up_to(pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
             return self.lens.sees_all_up_to(self._lens_rays(_in_front(pin_hole.to_plane(pixels))))
 
         return smooth_map(

@@ -7,6 +7,7 @@ coefficients, their order and the tilt as in OpenCV.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -24,9 +25,7 @@ __all__ = ["Brown", "Rational"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Decentred(Formula):
-    """A radial curve with decentering (p), thin prism (s) and sensor tilt (tau, radians) added, as OpenCV
-    adds them.
-    """
+    """A radial curve with decentering p, thin prism s and sensor tilt tau (radians) added, as by OpenCV."""
 
     chart = GNOMONIC
     radially_symmetric: ClassVar[bool] = False
@@ -53,11 +52,9 @@ class _Decentred(Formula):
 
     @abstractmethod
     def gain_slopes(self, u: ndarray, g: ndarray) -> dict[str, ndarray]:
-        """Derivatives of the gain by the radial coefficients, all at once since each is made of the one
-        before.
-        """
+        """Derivatives of the gain g at u by all radial coefficients, since each is made of the one before."""
 
-    def warp(self, x, y):
+    def warp(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:
         u = x * x + y * y
         g = self.bare_gain(u)
         if self.p1 or self.p2:
@@ -71,7 +68,7 @@ class _Decentred(Formula):
             y_d += (s3 + s4 * u) * u
         return _through(self._tilt_matrix, x_d, y_d) if any(self.tilt) else (x_d, y_d)
 
-    def linearise(self, x, y, wanted=()):
+    def linearise(self, x: ndarray, y: ndarray, wanted: Sequence[str] = ()) -> Warp:
         u = x * x + y * y
         radial, h = self.gain(u)
         p1, p2 = 2.0 * self.p1, 2.0 * self.p2
@@ -96,13 +93,12 @@ class _Decentred(Formula):
             self._tilted(flat, wanted) if any(self.tilt) or "tau_x" in wanted or "tau_y" in wanted else flat
         )
 
-    def unwarp(self, x_d, y_d):
+    def unwarp(self, x_d: ndarray, y_d: ndarray) -> tuple[ndarray, ndarray]:
         level = self._level
         if level is not self:  # seen on a level sensor, the goal is nearer to the radial curve
             m = np.linalg.inv(self._tilt_matrix)
-            in_front = (
-                m[2, 0] * x_d + m[2, 1] * y_d + m[2, 2] > 0
-            )  # past the horizon of the tilted plane nothing is seen
+            # Past the horizon of the tilted plane nothing is seen.
+            in_front = m[2, 0] * x_d + m[2, 1] * y_d + m[2, 2] > 0
             x_d, y_d = _through(m, np.where(in_front, x_d, np.nan), y_d)
         x, y = x_d.astype(np.float32), y_d.astype(np.float32)  # a start needs no more digits
         with np.errstate(all="ignore"):
@@ -122,9 +118,10 @@ class _Decentred(Formula):
 
     @cached_property
     def _tilt_matrix(self) -> ndarray:
+        """The homography from the level sensor to the tilted one."""
         return _tilt(*self.tilt)[0]
 
-    def _tilted(self, at: Warp, wanted) -> Warp:
+    def _tilted(self, at: Warp, wanted: Sequence[str]) -> Warp:
         """Everything seen on the tilted sensor: a homography of the plane, so the chain rule."""
         matrix, by_tau_x, by_tau_y = _tilt(*self.tilt)
         m = matrix
@@ -136,10 +133,10 @@ class _Decentred(Formula):
         h_xx, h_xy = (m[0, 0] - x * m[2, 0]) * w, (m[0, 1] - x * m[2, 1]) * w
         h_yx, h_yy = (m[1, 0] - y * m[2, 0]) * w, (m[1, 1] - y * m[2, 1]) * w
 
-        def chained(a, b):
+        def chained(a: ndarray, b: ndarray) -> tuple[ndarray, ndarray]:
             return h_xx * a + h_xy * b, h_yx * a + h_yy * b
 
-        def by_angle(d):
+        def by_angle(d: ndarray) -> tuple[ndarray, ndarray]:
             top, middle, bottom = (d[i, 0] * at.x + d[i, 1] * at.y + d[i, 2] for i in range(3))
             return (top - x * bottom) * w, (middle - y * bottom) * w
 
@@ -154,8 +151,9 @@ class _Decentred(Formula):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Brown(_Decentred):
-    """Radial k1 k2 k3, decentering p1 p2, thin prism s1..s4, tilt tau_x tau_y (OpenCV's 4, 5; 12 and 14
-    without k4..k6).
+    """Radial k1 k2 k3, decentering p1 p2, thin prism s1..s4, tilt tau_x tau_y.
+
+    These are OpenCV's vectors of 4 and 5, and of 12 and 14 without k4..k6.
     """
 
     free: ClassVar[tuple[str, ...]] = ("k1", "k2", "p1", "p2", "k3")
@@ -167,21 +165,22 @@ class Brown(_Decentred):
     tau_x: float = 0.0
     tau_y: float = 0.0
 
-    def bare_gain(self, u):
+    def bare_gain(self, u: ndarray) -> ndarray:
         return 1.0 + u * (self.k1 + u * (self.k2 + u * self.k3))
 
-    def gain(self, u):
+    def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
         return self.bare_gain(u), 2.0 * self.k1 + u * (4.0 * self.k2 + (6.0 * self.k3) * u)
 
-    def gain_slopes(self, u, g):
+    def gain_slopes(self, u: ndarray, g: ndarray) -> dict[str, ndarray]:
         u2 = u * u
         return {"k1": u, "k2": u2, "k3": u2 * u}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rational(_Decentred):
-    """(1 + k1 u + k2 u^2 + k3 u^3) / (1 + k4 u + k5 u^2 + k6 u^3) with the same additions (OpenCV's 8, 12 and
-    14).
+    """(1 + k1 u + k2 u^2 + k3 u^3) / (1 + k4 u + k5 u^2 + k6 u^3), with p1 p2, s1..s4, tau_x tau_y added.
+
+    These are OpenCV's vectors of 8, 12 and 14.
     """
 
     free: ClassVar[tuple[str, ...]] = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
@@ -196,28 +195,37 @@ class Rational(_Decentred):
     tau_x: float = 0.0
     tau_y: float = 0.0
 
-    def bare_gain(self, u):
+    def bare_gain(self, u: ndarray) -> ndarray:
         return (1.0 + u * (self.k1 + u * (self.k2 + u * self.k3))) / self._denominator(u)
 
-    def gain(self, u):
+    def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
         below = 1.0 / self._denominator(u)
         g = (1.0 + u * (self.k1 + u * (self.k2 + u * self.k3))) * below
         slope_above = 2.0 * self.k1 + u * (4.0 * self.k2 + (6.0 * self.k3) * u)  # twice, as h is
         slope_below = 2.0 * self.k4 + u * (4.0 * self.k5 + (6.0 * self.k6) * u)
         return g, (slope_above - g * slope_below) * below
 
-    def gain_slopes(self, u, g):
+    def gain_slopes(self, u: ndarray, g: ndarray) -> dict[str, ndarray]:
         k1 = u / self._denominator(u)
         k2, k4 = u * k1, -g * k1
         k3, k5 = u * k2, u * k4
         return {"k1": k1, "k2": k2, "k3": k3, "k4": k4, "k5": k5, "k6": u * k5}
 
     def _denominator(self, u: ndarray) -> ndarray:
+        """What the gain is divided by."""
         return 1.0 + u * (self.k4 + u * (self.k5 + u * self.k6))
 
 
 def _by(name: str, x: ndarray, y: ndarray, u: ndarray, slopes: dict[str, ndarray]) -> tuple[ndarray, ndarray]:
-    """Derivative of the place on a level sensor by one coefficient.  slopes: of the gain."""
+    """Derivative of the place on a level sensor by one coefficient.
+
+    Args:
+        name: of the coefficient.
+        x: of places in the chart.
+        y: of these places.
+        u: their x^2 + y^2.
+        slopes: derivatives of the gain by the radial coefficients.
+    """
     if name in slopes:
         return x * slopes[name], y * slopes[name]
     if name == "p1":
@@ -251,7 +259,8 @@ def _tilt(tau_x: float, tau_y: float) -> tuple[ndarray, ndarray, ndarray]:
     about_y = np.array([[c_y, 0, -s_y], [0, 1, 0], [s_y, 0, c_y]])
     d_about_y = np.array([[-s_y, 0, -c_y], [0, 0, 0], [c_y, 0, -s_y]])
 
-    def projector(turned):  # and, linear in the rotation, of its derivative but for the constant
+    # It is linear in the rotation but for the constant, so it does for the derivatives too.
+    def projector(turned: ndarray) -> ndarray:
         return np.array([[turned[2, 2], 0, -turned[0, 2]], [0, turned[2, 2], -turned[1, 2]], [0, 0, 0]])
 
     constant = np.diag([0.0, 0.0, 1.0])

@@ -15,16 +15,28 @@ __all__ = ["frame_grid", "image_difference"]
 
 
 def frame_grid(image_size: tuple[int, int], columns: int = 41, rows: int = 31) -> Float[ndarray, "n 2"]:
-    """Pixels of an even grid over the whole frame, row by row."""
+    """Pixels of an even grid over the whole frame, row by row.
+
+    Args:
+        image_size: (width, height) pixels.
+        columns: how many pixels a row has.
+        rows: how many rows there are.
+    """
     x, y = np.meshgrid(np.linspace(0, image_size[0] - 1, columns), np.linspace(0, image_size[1] - 1, rows))
     return np.stack([x.ravel(), y.ravel()], axis=-1)
 
 
 def image_difference(camera: Camera, other: Camera, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2"]:
-    """Where `other` sees what `camera` sees at these pixels, minus these pixels, after the rotation that
-    brings their rays together.
+    """Where another camera sees what this one sees at these pixels, minus these pixels.
 
-    pixels: (n,2) of `camera`.  NaN where either has no image.
+    The rotation that brings their rays together is taken out first.
+
+    Args:
+        camera: this one.
+        other: the other one.
+        pixels: of this one, (n,2).
+    Returns:
+        (n,2) pixels; NaN where either camera has no image.
     """
     mine, theirs = camera.unproject(pixels), other.unproject(pixels)
     both = np.isfinite(mine[:, 0]) & np.isfinite(theirs[:, 0])

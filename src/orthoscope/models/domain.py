@@ -17,20 +17,27 @@ from orthoscope.geometry.arrays import ndarray
 
 __all__ = ["Domain", "find_domain"]
 
-DIRECTIONS = 64
-HALVINGS = 12  # 2 pi / 64 / 2^12 is 2e-5 radians: a twentieth of a pixel in an image of 4000
-STEEP = 0.02  # neighbouring ends a < b with b - a > STEEP a (1 + b) get another between them
-MARGIN = 0.01  # between neighbours that are not steep an end may lie beyond both by this share
+# The end is looked for in this many even directions first.
+DIRECTION_COUNT = 64
+# A direction is halved at most this often: 2 pi / 64 / 2^12 is 2e-5 radians, a twentieth of a pixel of 4000.
+HALVING_ROUNDS = 12
+# Neighbouring ends a < b with b - a > STEEP_SHARE a (1 + b) get another end between them.
+STEEP_SHARE = 0.02
+# Between neighbours that are not steep an end may lie beyond both by this share.
+END_MARGIN = 0.01
 
-Folded = Callable[[ndarray, ndarray, ndarray], ndarray]  # of radius, cosine, sine
+# Whether a map has folded at places, of which radius, cosine and sine are given.
+Folded = Callable[[ndarray, ndarray, ndarray], ndarray]
 
 
 @dataclass(frozen=True, eq=False)
 class Domain:
     """The part of a chart that a lens images.
 
-    hole: radius around the centre without image. angles: (d,) of directions, ascending from -pi to pi. ends:
-    (d,) their radii.
+    Attributes:
+        hole: radius around the centre without image.
+        angles: (d,) of directions, ascending from -pi to pi.
+        ends: (d,) radii at which the domain ends in these directions.
     """
 
     hole: float
@@ -45,7 +52,7 @@ class Domain:
     @property
     def inner(self) -> float:
         """Everything nearer (and beyond the hole) is in the domain."""
-        return float(self.ends[0] if self.symmetric else (1.0 - MARGIN) * self.ends.min())
+        return float(self.ends[0] if self.symmetric else (1.0 - END_MARGIN) * self.ends.min())
 
     @property
     def outer(self) -> float:
@@ -53,11 +60,12 @@ class Domain:
         return float(self.ends.max())
 
     def ends_towards(self, x: ndarray, y: ndarray) -> ndarray:
-        """For each place (x, y) about where the domain ends in its direction: not nearer, but in the few
-        narrow steep sectors.
+        """For each place (x, y) about the radius at which the domain ends in its direction.
+
+        The domain ends no nearer than that but in the few narrow sectors that are steep.
         """
         a, b = self.ends[:-1], self.ends[1:]
-        ends = np.where(_steep(self.ends), np.minimum(a, b), (1.0 + MARGIN) * np.maximum(a, b))
+        ends = np.where(_steep(self.ends), np.minimum(a, b), (1.0 + END_MARGIN) * np.maximum(a, b))
         sector = np.searchsorted(self.angles, np.arctan2(y, x)) - 1
         return ends[sector.clip(0, len(ends) - 1)]
 
@@ -65,14 +73,17 @@ class Domain:
 def find_domain(folded: Folded, radii: ndarray, *, hole: float, symmetric: bool) -> Domain:
     """The domain of a map.
 
-    folded: tells of places (radius, cosine, sine) whether the map has folded there. radii: (n,) ascending,
-    where it is looked at first.
+    Args:
+        folded: tells of places (radius, cosine, sine) whether the map has folded there.
+        radii: (n,) ascending, at which it is looked at first.
+        hole: radius around the centre without image.
+        symmetric: whether all directions end alike.
     """
     if symmetric:
         return Domain(hole, np.array([-np.pi, np.pi]), np.repeat(_first_fold(folded, radii, np.zeros(1)), 2))
-    angles = np.linspace(-np.pi, np.pi, DIRECTIONS + 1)
+    angles = np.linspace(-np.pi, np.pi, DIRECTION_COUNT + 1)
     ends = _first_fold(folded, radii, angles)
-    for _ in range(HALVINGS):
+    for _ in range(HALVING_ROUNDS):
         steep = np.flatnonzero(_steep(ends))
         if not len(steep):
             break
@@ -83,13 +94,15 @@ def find_domain(folded: Folded, radii: ndarray, *, hole: float, symmetric: bool)
 
 
 def _steep(ends: ndarray) -> ndarray:
+    """Between which neighbours the end changes fast."""
     a, b = np.minimum(ends[:-1], ends[1:]), np.maximum(ends[:-1], ends[1:])
-    return b - a > STEEP * a * (1.0 + b)
+    return b - a > STEEP_SHARE * a * (1.0 + b)
 
 
 def _first_fold(folded: Folded, radii: ndarray, angles: ndarray) -> ndarray:
-    """In each direction the radius up to which the map has not folded: among the radii, then 32 times finer
-    again and again.
+    """In each direction the radius up to which the map has not folded.
+
+    It is looked for among the radii, then 32 times finer again and again.
     """
     cosine, sine = np.cos(angles), np.sin(angles)
     radii = np.concatenate([[0.0], radii])

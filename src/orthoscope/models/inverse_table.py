@@ -18,15 +18,19 @@ from orthoscope.geometry.arrays import ndarray
 
 __all__ = ["Lookup", "tabulated"]
 
-CELLS = 2048  # 48 kB of parabolas in double precision, so the table stays in a core's own cache
+# So many cells are 48 kB of parabolas in double precision, so the table stays in a core's own cache.
+CELL_COUNT = 2048
 
 
 class Lookup(NamedTuple):
-    """A tabulated q: to about nine digits inside the curve, to fewer beside a fold, where q bends without
-    bound.
+    """A tabulated q: to about nine digits inside the curve, fewer beside a fold, where q bends without bound.
 
-    end, last: u_d and s where the curve ends. middle: c. cells: of the table for each 1 of t. parabolas:
-    (cells,) by powers of t.
+    Attributes:
+        end: u_d where the curve ends.
+        last: s where the curve ends.
+        middle: c of the module's docstring.
+        cells: how many cells of the table there are for each 1 of t.
+        parabolas: their coefficients by powers of t, lowest first, (cells,) each.
     """
 
     end: float
@@ -36,9 +40,7 @@ class Lookup(NamedTuple):
     parabolas: tuple[ndarray, ndarray, ndarray]
 
     def __call__(self, u_d: ndarray) -> ndarray:
-        """q at u_d, in the precision of u_d and the table; past the curve's end the q that leads to the
-        end.
-        """
+        """q at u_d, in the precision of u_d and the table; past the end the q that leads to the end."""
         t = u_d / (u_d + self.middle)
         cell = (t * self.cells).astype(np.intp)
         constant, slope, bend = (part.take(cell, mode="clip") for part in self.parabolas)
@@ -48,18 +50,21 @@ class Lookup(NamedTuple):
         return q
 
     def single(self) -> Lookup:
-        """The same in single precision."""
+        """The same table in single precision."""
         constant, slope, bend = (part.astype(np.float32) for part in self.parabolas)
         return self._replace(parabolas=(constant, slope, bend))
 
 
 def tabulated(ratio: Callable[[ndarray], ndarray], *, end: float, last: float, middle: float) -> Lookup:
-    """The table of an exact `ratio`, which is q as a function of u_d; half of all cells are for u_d below
-    `middle` where `end` is far.
+    """The table of an exact q; half of all cells are for u_d below the middle where the end is far.
 
-    Where `ratio` is NaN, as in the image of a hole, so is the table.
+    Args:
+        ratio: q as a function of u_d, exact; where it is NaN, as in the image of a hole, so is the table.
+        end: u_d where the curve ends.
+        last: s where the curve ends.
+        middle: c of the module's docstring.
     """
-    t = np.linspace(0.0, end / (end + middle), 2 * CELLS + 1)
+    t = np.linspace(0.0, end / (end + middle), 2 * CELL_COUNT + 1)
     q = ratio(np.minimum(middle * t / (1.0 - t), end))
     left, half, right = q[:-1:2], q[1::2], q[2::2]
     start, width = t[:-1:2], t[2]

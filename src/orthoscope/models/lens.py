@@ -1,5 +1,4 @@
-"""What a lens is: a map of one chart's plane to the distorted plane, its inverse, its Jacobians and its
-domain.
+"""What a lens is: a map of a chart's plane to the distorted plane, its inverse, Jacobians and domain.
 
 (x, y) is a ray's place in the lens's chart (charts.py), u = x^2 + y^2 = s^2, (x_d, y_d) its distorted place.
 The radial part of every lens is one curve, given as a *gain* in u:
@@ -23,22 +22,27 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Bool, Float, InputError, frozen, ndarray
 from orthoscope.models.charts import Chart
-from orthoscope.models.chunks import in_blocks
+from orthoscope.models.chunks import in_chunks
 from orthoscope.models.domain import Domain, find_domain
 from orthoscope.models.inverse_table import Lookup, tabulated
 from orthoscope.models.newton_inverse import Warp, determinant
 
 __all__ = ["Formula", "Lens", "RadialLens", "Warp"]
 
-SAMPLES = 1024  # radii at which a curve is tabulated: as start of the inverse, and to find the first fold
-SECTORS = 32  # of directions in the image, for each of which it is known how far the image reaches
-STEEPEST = 1e-6  # a gnomonic chart is looked at up to this close to 90 degrees (radians)
-MIDDLE = np.pi / 4  # of the inverse's table half of the cells lie within this angle
-NEAR = 3e-9  # a Newton step shorter than this share leaves less than a rounding, since the error squares;
-# but not beside a fold or a border where the slope has none: there u_d goes from this share of its end to all
-# of it
-SHY = 0.99
-TINY = 1e-150  # a radius next to zero whose square is a number still
+# A curve is tabulated at this many radii: as start of the inverse, and to find the first fold.
+CURVE_SAMPLES = 1024
+# The image is parted into so many sectors of directions, of each of which it is known how far it reaches.
+SECTOR_COUNT = 32
+# A chart is looked at up to this close to the end of its reach, radians.
+LEAST_GRAZING_ANGLE = 1e-6
+# Half of the cells of the inverse's table lie within this angle from the axis, radians.
+MIDDLE_ANGLE = np.pi / 4
+# A Newton step shorter than this share leaves less than a rounding, since the error squares.
+LAST_NEWTON_STEP = 3e-9
+# Newton's error does not square beside a fold or a border, where u_d is beyond this share of its end.
+NEWTON_END_SHARE = 0.99
+# A radius next to zero, whose square is a number still.
+TINY_RADIUS = 1e-150
 
 AnyLens = TypeVar("AnyLens", bound="Lens")
 AnyFormula = TypeVar("AnyFormula", bound="Formula")
@@ -46,9 +50,13 @@ AnyFormula = TypeVar("AnyFormula", bound="Formula")
 
 @dataclass(frozen=True, eq=False)
 class Lens(ABC):
-    """A lens: `distort` takes rays to its plane, `undistort` takes them back; NaN where there is no image."""
+    """A lens: `distort` takes rays to its plane, `undistort` takes them back; NaN where there is no image.
 
-    scaled_by: ClassVar[str | None] = None  # the coefficient that scales the whole plane, as K does too
+    Attributes:
+        scaled_by: the coefficient that scales the whole plane, as K does too; None where there is none.
+    """
+
+    scaled_by: ClassVar[str | None] = None
 
     @property
     @abstractmethod
@@ -78,7 +86,10 @@ class Lens(ABC):
     def with_coefficients(self: AnyLens, **values: float) -> AnyLens:
         """The same lens with some coefficients replaced.
 
-        Raises InputError for a coefficient that it does not have.
+        Args:
+            values: the new ones, by name.
+        Raises:
+            InputError: the lens has no such coefficient.
         """
 
     @abstractmethod
@@ -87,11 +98,17 @@ class Lens(ABC):
 
     @abstractmethod
     def warp(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:
-        """The formula itself, also beyond the domain (arrays of one shape)."""
+        """Places (x_d, y_d) by the formula itself, also beyond the domain (arrays of one shape)."""
 
     @abstractmethod
     def linearise(self, x: ndarray, y: ndarray, wanted: Sequence[str] = ()) -> Warp:
-        """The formula with its derivatives by x, y and the wanted coefficients, also beyond the domain."""
+        """The formula with its derivatives, also beyond the domain.
+
+        Args:
+            x: of places in the chart.
+            y: of these places, of the same shape.
+            wanted: the coefficients by which derivatives are asked for, beside those by x and y.
+        """
 
     @abstractmethod
     def unwarp(self, x_d: ndarray, y_d: ndarray) -> tuple[ndarray, ndarray]:
@@ -99,14 +116,17 @@ class Lens(ABC):
 
     @property
     def field_angle(self) -> float:
-        """The angle from the axis at which the domain ends, radians (in the direction where it reaches
-        farthest).
-        """
+        """The angle from the axis at which the domain ends, radians, where it is farthest."""
         return float(self.chart.angle(np.float64(self.domain.outer)))
 
     def distort(self, rays: Float[ndarray, "n 3"], *, beyond: bool = False) -> Float[ndarray, "n 2"]:
-        """Where rays (n,3), any length, fall on the lens's plane; NaN beyond the domain, unless the formula
-        is to go on `beyond` it.
+        """Where rays fall on the lens's plane.
+
+        Args:
+            rays: (n,3), of any length.
+            beyond: whether the formula goes on beyond the domain.
+        Returns:
+            (n,2); NaN where a ray has no image.
         """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             x, y = self.chart.flatten(rays[:, 0], rays[:, 1], rays[:, 2])
@@ -117,7 +137,7 @@ class Lens(ABC):
 
     def undistort(self, plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Unit rays (n,3) that fall on these places (n,2) of the lens's plane; NaN where none does."""
-        return in_blocks(lambda x_d, y_d: self.chart.lift(*self.unwarp(x_d, y_d)), plane, width=3)
+        return in_chunks(lambda x_d, y_d: self.chart.lift(*self.unwarp(x_d, y_d)), plane, width=3)
 
     def sees(self, x: ndarray, y: ndarray) -> ndarray:
         """Which places of the chart lie in the domain."""
@@ -140,8 +160,7 @@ class Lens(ABC):
         return seen
 
     def sees_all_up_to(self, rays: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
-        """Whether not only a ray (n,3) lies in the domain but every one that is no farther from the axis, so
-        far as is known at once.
+        """Whether all rays no farther from the axis than each of these lie in the domain, so far as is known.
 
         In a pin-hole's plane these are a disc: a lens that sees all up to the corners of a rectangle sees all
         of the rectangle.
@@ -151,15 +170,15 @@ class Lens(ABC):
         return (x * x + y * y < self.domain.inner**2) & (self.domain.hole == 0)
 
     def invert_curve(self, r_d: ndarray) -> ndarray:
-        """s of the radial curve at r_d >= 0: table, Newton, and bisection where Newton was not exact; NaN
-        beyond the domain.
+        """s of the radial curve at r_d >= 0; NaN beyond the domain.
+
+        The table gives the start, Newton the rest, and bisection what Newton did not get exact.
         """
         s_table, r_table = self._table
         if len(r_table) == 0:  # a curve that is negative all along
             return np.full_like(r_d, np.nan)
-        inside = (r_d >= r_table[0]) & (
-            r_d <= r_table[-1] * (1.0 + 1e-15)
-        )  # at a fold r_d may be a rounding past the table
+        # At a fold r_d may be a rounding past the table.
+        inside = (r_d >= r_table[0]) & (r_d <= r_table[-1] * (1.0 + 1e-15))
         s = np.interp(r_d, r_table, s_table)
         for _ in range(3):
             g, h = self.gain(s * s)
@@ -171,9 +190,7 @@ class Lens(ABC):
         return np.where(inside, s, np.nan)
 
     def _bisect(self, r_d: ndarray) -> ndarray:
-        """Newton kept inside its cell of the table by bisection, for the few places where free Newton was not
-        exact.
-        """
+        """s by Newton kept inside its cell of the table, where free Newton was not exact."""
         s_table, r_table = self._table
         cell = np.searchsorted(r_table, r_d).clip(1, len(r_table) - 1)
         low, high = s_table[cell - 1].copy(), s_table[cell].copy()
@@ -189,8 +206,9 @@ class Lens(ABC):
         return s
 
     def beyond_image(self, x_d: ndarray, y_d: ndarray) -> ndarray:
-        """Which places are certainly not in the image of the domain: farther out than any sample of it in
-        about their direction.
+        """Which places are certainly not in the image of the domain.
+
+        They are farther out than any sample of it in about their direction.
         """
         farthest = self._farthest
         u_d = x_d * x_d + y_d * y_d
@@ -201,9 +219,7 @@ class Lens(ABC):
 
     @cached_property
     def _farthest(self) -> ndarray:
-        """How far the image of the domain reaches in each sector of directions, with a margin; infinite where
-        it is not known.
-        """
+        """How far the domain's image reaches in each sector, with a margin; infinite if not known."""
         ends = self.chart.angle(self.domain.ends)
         s = self.chart.radius(ends * np.linspace(0.0, 1.0 - 1e-12, 65)[:, None])
         with np.errstate(all="ignore"):
@@ -211,7 +227,7 @@ class Lens(ABC):
                 part.ravel()
                 for part in self.warp(s * np.cos(self.domain.angles), s * np.sin(self.domain.angles))
             )
-        reach = np.zeros(SECTORS)
+        reach = np.zeros(SECTOR_COUNT)
         np.maximum.at(reach, _sector(x_d, y_d), np.nan_to_num(np.hypot(x_d, y_d), nan=np.inf))
         reach[reach == 0] = np.inf
         return 1.05 * np.maximum(reach, np.maximum(np.roll(reach, 1), np.roll(reach, -1)))
@@ -220,33 +236,30 @@ class Lens(ABC):
     def domain(self) -> Domain:
         """Where the lens has an image."""
 
-        def folded(s, cosine, sine):
+        def folded(s: ndarray, cosine: ndarray, sine: ndarray) -> ndarray:
             with np.errstate(all="ignore"):
                 at = self.linearise(s * cosine, s * sine)
                 g, h = self.gain(s * s + 0.0 * cosine)
-                # a radial curve that has come back through zero has folded, whatever its determinant says
+                # A radial curve that has come back through zero has folded, whatever its determinant says.
                 whole = (determinant(at) > 0) & (g + h * (s * s) > 0) & np.isfinite(at.x) & np.isfinite(at.y)
                 return ~whole & (s > self._hole)
 
-        radii = self._radii(self._limit, SAMPLES if self.radially_symmetric else SAMPLES // 4)[1:]
+        radii = self._radii(self._limit, CURVE_SAMPLES if self.radially_symmetric else CURVE_SAMPLES // 4)[1:]
         return find_domain(folded, radii, hole=self._hole, symmetric=self.radially_symmetric)
 
     @property
     def _limit(self) -> float:
-        return float(self.chart.radius(np.float64(self.chart.reach - STEEPEST)))
+        """The radius up to which the chart is looked at."""
+        return float(self.chart.radius(np.float64(self.chart.reach - LEAST_GRAZING_ANGLE)))
 
-    def _radii(self, end: float, samples: int = SAMPLES) -> ndarray:
-        """Radii from 0 to end, their angles dense at both: at the axis, where most is seen, and at the end,
-        where curves bend.
-        """
+    def _radii(self, end: float, samples: int = CURVE_SAMPLES) -> ndarray:
+        """Radii from 0 to the end, dense at the axis, where most is seen, and at the end, where it bends."""
         t = np.linspace(0.0, 1.0, samples)
         return self.chart.radius(self.chart.angle(np.float64(end)) * t**3 * (10.0 + t * (6.0 * t - 15.0)))
 
     @cached_property
     def _hole(self) -> float:
-        """Radius around the centre without image: 0 but for a curve that starts below zero (pfet with a0 <
-        0).
-        """
+        """Radius around the centre without image: 0 but for a curve that starts below zero (pfet, a0 < 0)."""
         radii = self._radii(self._limit)[1:]
         with np.errstate(all="ignore"):
             inside_out = ~(self.gain(radii * radii)[0] > 0)
@@ -268,10 +281,8 @@ class Lens(ABC):
             s = self._radii(self.domain.outer if self.radially_symmetric else self._curve_end)
             s = np.concatenate([[self._hole], s[s > self._hole]])
             r = s * self.gain(s * s)[0]
-            if np.isnan(r[0]):
-                r[0] = (
-                    TINY * self.gain(np.full(1, TINY * TINY))[0][0]
-                )  # the limit at the centre of a curve that does not start at 0
+            if np.isnan(r[0]):  # the limit at the centre of a curve that does not start at 0
+                r[0] = TINY_RADIUS * self.gain(np.full(1, TINY_RADIUS * TINY_RADIUS))[0][0]
         usable = np.isfinite(r) & (r >= 0)
         return s[usable], r[usable]
 
@@ -279,11 +290,13 @@ class Lens(ABC):
     def inverse_curve(self) -> Lookup:
         """The inverse of the radial curve, tabulated."""
         s_table, r_table = self._table
-        middle = float(np.interp(min(float(self.chart.radius(MIDDLE)), 0.5 * s_table[-1]), s_table, r_table))
+        middle = float(
+            np.interp(min(float(self.chart.radius(MIDDLE_ANGLE)), 0.5 * s_table[-1]), s_table, r_table)
+        )
 
-        def ratio(u_d):
+        def ratio(u_d: ndarray) -> ndarray:
             with np.errstate(all="ignore"):
-                r_d = np.maximum(np.sqrt(u_d), TINY)
+                r_d = np.maximum(np.sqrt(u_d), TINY_RADIUS)
                 return self.invert_curve(r_d) / r_d
 
         return tabulated(ratio, end=float(r_table[-1] ** 2), last=float(s_table[-1]), middle=middle * middle)
@@ -299,16 +312,16 @@ class Lens(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Formula(Lens):
-    """A lens whose coefficients are all there is to it: subclasses are frozen dataclasses whose fields are
-    the coefficients, in order.
+    """A lens whose coefficients are all there is to it: frozen dataclasses whose fields they are, in order.
+
+    Attributes:
+        starts: coefficients from which a fit may have to start to find its minimum.
     """
 
     chart: ClassVar[Chart]  # type: ignore[misc]
     radially_symmetric: ClassVar[bool]  # type: ignore[misc]
     free: ClassVar[tuple[str, ...]]  # type: ignore[misc]
-    starts: ClassVar[tuple[dict[str, float], ...]] = (
-        {},
-    )  # coefficients from which a fit may have to start to find its minimum
+    starts: ClassVar[tuple[dict[str, float], ...]] = ({},)
 
     def __post_init__(self) -> None:
         frozen(
@@ -346,20 +359,20 @@ class RadialLens(Formula):
 
     @abstractmethod
     def gain_by(self, name: str, u: ndarray, g: ndarray) -> ndarray:
-        """Derivative of the gain g by one coefficient."""
+        """Derivative of the gain g at u by one coefficient."""
 
-    def warp(self, x, y):
+    def warp(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:
         g, _ = self.gain(x * x + y * y)
         return x * g, y * g
 
-    def linearise(self, x, y, wanted=()):
+    def linearise(self, x: ndarray, y: ndarray, wanted: Sequence[str] = ()) -> Warp:
         u = x * x + y * y
         g, h = self.gain(u)
         h_xy = h * x * y
         by = [(x * slope, y * slope) for slope in (self.gain_by(name, u, g) for name in wanted)]
         return Warp(x * g, y * g, g + h * x * x, h_xy, h_xy, g + h * y * y, by)
 
-    def unwarp(self, x_d, y_d):
+    def unwarp(self, x_d: ndarray, y_d: ndarray) -> tuple[ndarray, ndarray]:
         if len(self._table[1]) == 0:  # a curve that is negative all along
             return np.full_like(x_d, np.nan), np.full_like(y_d, np.nan)
         u_d = x_d * x_d + y_d * y_d
@@ -368,13 +381,16 @@ class RadialLens(Formula):
         g, h = self.gain(u)
         step = (q * g - 1.0) / (g + h * u)
         q -= step
-        poor = np.flatnonzero(~((np.abs(step) <= NEAR * q) & (u_d <= SHY * self.inverse_curve.end)))
+        poor = np.flatnonzero(
+            ~((np.abs(step) <= LAST_NEWTON_STEP * q) & (u_d <= NEWTON_END_SHARE * self.inverse_curve.end))
+        )
         q[poor] = self._exact_ratio(np.sqrt(u_d[poor]))
         return x_d * q, y_d * q
 
     def _exact_ratio(self, r_d: ndarray) -> ndarray:
-        """s / r_d where the table is no good start: beside a fold, at the centre of a curve that has a corner
-        there, beyond the domain.
+        """s / r_d where the table is no good start.
+
+        That is beside a fold, at the centre of a curve that has a corner there, and beyond the domain.
         """
         s = self.invert_curve(r_d)
         centre = r_d == 0
@@ -382,6 +398,6 @@ class RadialLens(Formula):
 
 
 def _sector(x: ndarray, y: ndarray) -> ndarray:
-    """Which of SECTORS equal sectors of directions a place lies in."""
+    """The number of the sector of directions that each place lies in."""
     turn = np.nan_to_num(np.arctan2(y, x) / (2.0 * np.pi) + 0.5)
-    return (turn * SECTORS).astype(np.int64) % SECTORS
+    return (turn * SECTOR_COUNT).astype(np.int64) % SECTOR_COUNT

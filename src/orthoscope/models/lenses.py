@@ -27,8 +27,10 @@ __all__ = [
     "parse_lens",
 ]
 
-FREE = "free"  # a formula with a displacement on top: no kind of its own, since it has a base
+# A formula with a displacement on top is no kind of its own, since it has a base; this is what it is called.
+FREE = "free"
 
+# Every formula by its name.
 LENSES: dict[str, type[Formula]] = {
     "brown": Brown,
     "rational": Rational,
@@ -42,10 +44,12 @@ LENSES: dict[str, type[Formula]] = {
 
 
 def parse_lens(text: str) -> tuple[type[Formula], tuple[str, ...]]:
-    """The lens of a description such as `brown` or `brown:k1,k2`, and the coefficients that a calibration is
-    to free.
+    """The lens of a description, and the coefficients that a calibration is to free.
 
-    Raises InputError for a lens or a coefficient that is not there.
+    Args:
+        text: such as `brown` or `brown:k1,k2`.
+    Raises:
+        InputError: a lens or a coefficient that is not there.
     """
     name, _, listed = text.strip().partition(":")
     if name not in LENSES:
@@ -64,10 +68,12 @@ def parse_lens(text: str) -> tuple[type[Formula], tuple[str, ...]]:
 
 
 def lens_with_values(text: str) -> Formula:
-    """The lens of a description with values, such as `brown:k1=-0.3,k2=0.1`; coefficients that are not named
-    keep their usual value.
+    """The lens of a description with values.
 
-    Raises InputError for a lens, a coefficient or a value that is none.
+    Args:
+        text: such as `brown:k1=-0.3,k2=0.1`; coefficients that are not named keep their usual value.
+    Raises:
+        InputError: a lens, a coefficient or a value that is none.
     """
     name, _, listed = text.strip().partition(":")
     lens, _ = parse_lens(name)

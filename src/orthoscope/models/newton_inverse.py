@@ -25,15 +25,28 @@ from orthoscope.geometry.arrays import ndarray
 
 __all__ = ["Bent", "Warp", "determinant", "invert"]
 
-LEFT = 1e-13  # what two chords may leave, and places that they leave more of go on to Newton
-CLOSE = 1e-6  # after chords that have come down to this Newton goes on where they ended
-NEAR = 1e-9  # a Newton step shorter than this leaves an error below 1e-16, since the error squares
-STEPS, PATIENCE = 12, 200
+# Two chords may leave this much; places that they leave more of go on to Newton.
+CHORD_REST = 1e-13
+# Where the last chord is no longer than this Newton goes on where it ended, elsewhere from the start.
+CHORD_CLOSENESS = 1e-6
+# A Newton step shorter than this leaves an error below 1e-16, since the error squares.
+LAST_NEWTON_STEP = 1e-9
+# Free Newton is given this many steps.
+NEWTON_STEPS = 12
+# Newton's flow is given this many steps.
+FLOW_STEPS = 200
 
 
 class Bent(NamedTuple):
-    """Places of a plane before a displacement bent it, and the slopes of the displacement there: s_xy is d
-    s_x / d y.
+    """Places of a plane before a displacement bent it, and the slopes of the displacement there.
+
+    Attributes:
+        x: of the places.
+        y: of the places.
+        s_xx: d s_x / d x.
+        s_xy: d s_x / d y.
+        s_yx: d s_y / d x.
+        s_yy: d s_y / d y.
     """
 
     x: ndarray
@@ -45,10 +58,17 @@ class Bent(NamedTuple):
 
 
 class Warp(NamedTuple):
-    """A distorted place with its derivatives: j_xy is d x_d / d y; by[i] is d(x_d, y_d) by the i-th
-    coefficient asked for.
+    """Distorted places with their derivatives.
 
-    bent: of a lens that displaces the plane of another; None of a formula.
+    Attributes:
+        x: x_d of the places.
+        y: y_d of the places.
+        j_xx: d x_d / d x.
+        j_xy: d x_d / d y.
+        j_yx: d y_d / d x.
+        j_yy: d y_d / d y.
+        by: d(x_d, y_d) by each coefficient that was asked for.
+        bent: of a lens that displaces the plane of another; None of a formula.
     """
 
     x: ndarray
@@ -62,7 +82,7 @@ class Warp(NamedTuple):
 
 
 Place = tuple[ndarray, ndarray]
-Formula = Callable[[ndarray, ndarray], Place]
+PlaneMap = Callable[[ndarray, ndarray], Place]
 Linearise = Callable[[ndarray, ndarray], Warp]
 Sees = Callable[[ndarray, ndarray], ndarray]
 
@@ -73,14 +93,18 @@ def determinant(at: Warp) -> ndarray:
 
 
 def invert(
-    linearise: Linearise, sees: Sees, start: Place, goal: Place, *, formula: Formula | None = None
+    linearise: Linearise, sees: Sees, start: Place, goal: Place, *, formula: PlaneMap | None = None
 ) -> Place:
-    """The places that the map takes to `goal`; NaN where there is none in the domain, and where `start` is
-    NaN.
+    """The places that the map takes to a goal.
 
-    linearise: the map; also asked in single precision, where it need not answer in it. sees: which places lie
-    in its domain. start: places near the ones to be found, in either precision. formula: the map without
-    derivatives, where that is cheaper.
+    Args:
+        linearise: the map; also asked in single precision, where it need not answer in it.
+        sees: which places lie in its domain.
+        start: places near the ones to be found, in either precision.
+        goal: what the map is to take them to.
+        formula: the map without derivatives, where that is cheaper.
+    Returns:
+        Places; NaN where there is none in the domain, and where the start is NaN.
     """
     with np.errstate(all="ignore"):
         x, y, there, close = _lightly(formula or _plain(linearise), linearise, start, goal)
@@ -99,15 +123,18 @@ def invert(
     return x, y
 
 
-def _plain(linearise: Linearise) -> Formula:
+def _plain(linearise: Linearise) -> PlaneMap:
+    """The map without its derivatives."""
     return lambda x, y: linearise(x, y)[:2]
 
 
 def _lightly(
-    formula: Formula, linearise: Linearise, start: Place, goal: Place
+    formula: PlaneMap, linearise: Linearise, start: Place, goal: Place
 ) -> tuple[ndarray, ndarray, ndarray, ndarray]:
-    """Where a step in single precision and two chords lead, whether that is near enough, and whether it is a
-    nearer start.
+    """Where a step in single precision and two chords lead.
+
+    Returns:
+        x and y, whether that is near enough, and whether it is a nearer start.
     """
     x, y = _single(start)
     step_x, step_y, _ = _step(linearise(x, y), _single(goal))
@@ -120,18 +147,23 @@ def _lightly(
     x -= step_x
     y -= step_y
     step_x, step_y, second = _chord(formula(x, y), goal, along)
-    there = (second * second <= LEFT * LEFT * first) & (
-        inverse > 0
-    )  # lengths squared, so squares of squares; 0 is an overflow
+    # These are lengths squared, so squares of squares; an inverse of 0 is an overflow.
+    there = (second * second <= CHORD_REST * CHORD_REST * first) & (inverse > 0)
     x -= step_x
     y -= step_y
-    return x, y, there, second <= CLOSE * CLOSE
+    return x, y, there, second <= CHORD_CLOSENESS * CHORD_CLOSENESS
 
 
 def _chord(
     image: Place, goal: Place, along: tuple[ndarray, ndarray, ndarray, ndarray]
 ) -> tuple[ndarray, ndarray, ndarray]:
-    """A Newton step with a Jacobian from nearby, to be taken away from the place, and its length squared."""
+    """A step by a Jacobian from nearby, to be taken away from the place, and its length squared.
+
+    Args:
+        image: of the place.
+        goal: what the map is to take it to.
+        along: j_yy, j_xy, j_yx and j_xx, each over the determinant.
+    """
     j_yy, j_xy, j_yx, j_xx = along
     e_x, e_y = _single((image[0] - goal[0], image[1] - goal[1]))
     step_x, step_y = j_yy * e_x - j_xy * e_y, j_xx * e_y - j_yx * e_x
@@ -139,6 +171,7 @@ def _chord(
 
 
 def _single(place: Place) -> Place:
+    """Places in single precision."""
     return place[0].astype(np.float32, copy=False), place[1].astype(np.float32, copy=False)
 
 
@@ -146,7 +179,7 @@ def _briskly(linearise: Linearise, start: Place, goal: Place) -> tuple[ndarray, 
     """Where a few Newton steps lead, and whether the last of them was short."""
     x, y, moving = _advance(linearise, start, goal)
     active = np.flatnonzero(moving)
-    for _ in range(STEPS):
+    for _ in range(NEWTON_STEPS):
         if not len(active):
             break
         x[active], y[active], still = _advance(
@@ -158,9 +191,7 @@ def _briskly(linearise: Linearise, start: Place, goal: Place) -> tuple[ndarray, 
 
 
 def _advance(linearise: Linearise, place: Place, goal: Place) -> tuple[ndarray, ndarray, ndarray]:
-    """The next place, by one step (shortened where it would leap, as beside a fold), and whether another is
-    needed.
-    """
+    """The next place, and whether another is needed; a step that would leap is shortened."""
     x, y = place
     step_x, step_y, size = _step(linearise(x, y), goal)
     far = x * x + y * y
@@ -168,7 +199,7 @@ def _advance(linearise: Linearise, place: Place, goal: Place) -> tuple[ndarray, 
     if leaping.any():
         shorten = np.where(leaping, np.sqrt(0.25 * (0.01 + far) / size), 1.0)
         step_x, step_y = shorten * step_x, shorten * step_y
-    return x - step_x, y - step_y, ~(size <= NEAR * NEAR * (1.0 + far))
+    return x - step_x, y - step_y, ~(size <= LAST_NEWTON_STEP * LAST_NEWTON_STEP * (1.0 + far))
 
 
 def _step(at: Warp, goal: Place) -> tuple[ndarray, ndarray, ndarray]:
@@ -181,13 +212,11 @@ def _step(at: Warp, goal: Place) -> tuple[ndarray, ndarray, ndarray]:
 
 
 def _patiently(linearise: Linearise, sees: Sees, goal: Place) -> tuple[ndarray, ndarray, ndarray]:
-    """Where cut steps from the centre lead, and whether that is as near as numbers go, in the image or in the
-    place.
-    """
+    """Where cut steps from the centre lead, and whether that is as near as numbers go in image or place."""
     x, y, cut = (np.zeros_like(goal[0]) for _ in range(3))
     cut += 1.0
     active = np.arange(len(x))
-    for _ in range(PATIENCE):
+    for _ in range(FLOW_STEPS):
         a, b, aim = x[active], y[active], (goal[0][active], goal[1][active])
         at = linearise(a, b)
         step_x, step_y, size = _step(at, aim)
@@ -204,9 +233,10 @@ def _patiently(linearise: Linearise, sees: Sees, goal: Place) -> tuple[ndarray, 
         x,
         y,
         (_error(at, goal) <= 1e-28 * (1.0 + far))
-        | (_step(at, goal)[2] <= NEAR * NEAR * (1.0 + x * x + y * y)),
+        | (_step(at, goal)[2] <= LAST_NEWTON_STEP * LAST_NEWTON_STEP * (1.0 + x * x + y * y)),
     )
 
 
 def _error(at: Warp, goal: Place) -> ndarray:
+    """The squared distance from the goal."""
     return (at.x - goal[0]) ** 2 + (at.y - goal[1]) ** 2

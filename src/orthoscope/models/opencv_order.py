@@ -14,7 +14,8 @@ from orthoscope.models.radial_lenses import KannalaBrandt
 __all__ = ["OPENCV_ORDER", "opencv_coefficients", "opencv_distortion"]
 
 OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
-LENGTHS = (5, 8, 12, 14)  # of vectors that OpenCV takes
+# OpenCV takes vectors of these lengths.
+VECTOR_LENGTHS = (5, 8, 12, 14)
 
 
 def opencv_coefficients(lens: Brown | Rational) -> list[float]:
@@ -23,11 +24,11 @@ def opencv_coefficients(lens: Brown | Rational) -> list[float]:
     values = [known.get(name, 0.0) for name in OPENCV_ORDER]
     used = max((i + 1 for i, value in enumerate(values) if value), default=0)
     shortest = 8 if isinstance(lens, Rational) else 5
-    return values[: next(length for length in LENGTHS if length >= max(used, shortest))]
+    return values[: next(length for length in VECTOR_LENGTHS if length >= max(used, shortest))]
 
 
 def opencv_distortion(lens: Lens) -> list[float]:
-    """What OpenCV calls `distCoeffs`, of cv2 for brown and rational, of cv2.fisheye for kannala_brandt.
+    """What OpenCV calls `distCoeffs`: cv2's for brown and rational, cv2.fisheye's for kannala_brandt.
 
     Raises:
         InputError: OpenCV has no such formula.

@@ -3,10 +3,10 @@
 Symbols as in lens.py: u = s^2, r_d = s g(u), h = 2 dg/du.
 
 pfet, fet         A. Basu and S. Licardie, Alternative models for fish-eye lenses, PRL 16(4), 1995; the
-paper's eq. (1).
+                  paper's eq. (1).
 fov               F. Devernay and O. Faugeras, Straight lines have to be straight, MVA 13(1), 2001.
-division          A. Fitzgibbon, Simultaneous linear estimation of multiple view geometry and lens distortion,
-CVPR 2001.
+division          A. Fitzgibbon, Simultaneous linear estimation of multiple view geometry and lens
+                  distortion, CVPR 2001.
 kannala_brandt    J. Kannala and S. Brandt, A generic camera model and calibration method, TPAMI 28(8), 2006;
                   OpenCV's fisheye, Kalibr's equidistant.
 stereographic     mrcal's; J. P. Snyder, Map Projections: A Working Manual, USGS 1395, 1987.
@@ -48,7 +48,7 @@ class Pfet(RadialLens):
     a4: float = 0.0
     a5: float = 0.0
 
-    def gain(self, u):
+    def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
         s = np.sqrt(u)
         g = self.a1 + s * (self.a2 + s * (self.a3 + s * (self.a4 + s * self.a5)))
         slope = self.a2 + s * (2 * self.a3 + s * (3 * self.a4 + s * 4 * self.a5))  # dg/ds; h = slope / s
@@ -56,7 +56,7 @@ class Pfet(RadialLens):
             return g, _over(slope, s)
         return g + self.a0 / s, slope / s - self.a0 / (u * s)
 
-    def gain_by(self, name, u, g):
+    def gain_by(self, name: str, u: ndarray, g: ndarray) -> ndarray:
         s, power = np.sqrt(u), int(name[1]) - 1
         return prod([s] * power, start=np.ones_like(s)) if power >= 0 else 1.0 / s
 
@@ -76,13 +76,13 @@ class Fet(RadialLens):
     scale: float = 10.0
     l: float = 0.1  # noqa: E741  the formula's own letter
 
-    def gain(self, u):
+    def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
         s = np.sqrt(u)
         z = self.l * s
         g = self.scale * self.l * _log_ratio(z)
         return g, _over(self.scale * self.l / (1.0 + z) - g, u)
 
-    def gain_by(self, name, u, g):
+    def gain_by(self, name: str, u: ndarray, g: ndarray) -> ndarray:
         s = np.sqrt(u)
         return g / self.scale if name == "scale" else self.scale / (1.0 + self.l * s)
 
@@ -97,12 +97,12 @@ class Fov(RadialLens):
 
     w: float = 0.0
 
-    def gain(self, u):
+    def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
         m, _ = self._stretch()
         z = m * m * u * self.w * self.w
         return m * _atan_ratio(z), 2.0 * m**3 * self.w * self.w * _atan_ratio_slope(z)
 
-    def gain_by(self, name, u, g):
+    def gain_by(self, name: str, u: ndarray, g: ndarray) -> ndarray:
         m, dm = self._stretch()
         z = m * m * u * self.w * self.w
         dz = 2.0 * m * u * self.w * (dm * self.w + m)
@@ -127,12 +127,12 @@ class Division(RadialLens):
 
     l: float = 0.0  # noqa: E741  the formula's own letter
 
-    def gain(self, u):
+    def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
         root = np.sqrt(1.0 - 4.0 * self.l * u)
         g = 2.0 / (1.0 + root)
         return g, 2.0 * self.l * g * g / root
 
-    def gain_by(self, name, u, g):
+    def gain_by(self, name: str, u: ndarray, g: ndarray) -> ndarray:
         return u * g * g / np.sqrt(1.0 - 4.0 * self.l * u)
 
 
@@ -148,13 +148,13 @@ class KannalaBrandt(RadialLens):
     k3: float = 0.0
     k4: float = 0.0
 
-    def gain(self, u):
+    def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
         k1, k2, k3, k4 = self.k1, self.k2, self.k3, self.k4
         return 1.0 + u * (k1 + u * (k2 + u * (k3 + u * k4))), 2.0 * (
             k1 + u * (2 * k2 + u * (3 * k3 + 4 * k4 * u))
         )
 
-    def gain_by(self, name, u, g):
+    def gain_by(self, name: str, u: ndarray, g: ndarray) -> ndarray:
         return prod([u] * int(name[1]), start=np.ones_like(u))  # many times faster than a power
 
 
@@ -165,7 +165,7 @@ class Stereographic(RadialLens):
     chart = EQUIDISTANT
     free: ClassVar[tuple[str, ...]] = ()
 
-    def gain(self, u):
+    def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
         small = u < SERIES_TO
         safe = np.where(small, 1.0, u)
         s = np.sqrt(safe)
@@ -177,7 +177,7 @@ class Stereographic(RadialLens):
             np.where(small, slope, ((1.0 + t * t) * s - 2.0 * t) / (safe * s)),
         )
 
-    def gain_by(self, name, u, g):
+    def gain_by(self, name: str, u: ndarray, g: ndarray) -> ndarray:
         raise AssertionError(f"a stereographic lens has no coefficient {name}")
 
 

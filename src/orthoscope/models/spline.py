@@ -1,7 +1,7 @@
 """A displacement of the plane by bicubic B-splines: smooth everywhere, zero away from its lattice.
 
 s(x, y) = sum over i, j of B((x - x_0) / h_x - i) B((y - y_0) / h_y - j) c_ij with the uniform cubic B-spline
-B, whose four pieces on a cell are the WEIGHTS below (C. de Boor, A Practical Guide to Splines, 1978).
+B, whose four pieces on a cell are the PIECE_WEIGHTS below (C. de Boor, A Practical Guide to Splines, 1978).
 Coefficients outside the lattice are zero, so s falls to zero within three cells of its border, twice
 continuously differentiable all the way.
 
@@ -21,21 +21,27 @@ from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 
 __all__ = ["Displacement", "Lattice"]
 
-ACROSS = 4  # splines that are not zero on a cell, in each direction
-# the four pieces of the cubic B-spline on a cell as polynomials in t = 0..1, lowest power first
-WEIGHTS = (
+# So many splines are not zero on a cell, in each direction.
+SPLINES_ACROSS_CELL = 4
+# The four pieces of the cubic B-spline on a cell are these polynomials in t = 0..1, lowest power first.
+PIECE_WEIGHTS = (
     np.array([[1.0, -3.0, 3.0, -1.0], [4.0, 0.0, -6.0, 3.0], [1.0, 3.0, 3.0, -3.0], [0.0, 0.0, 0.0, 1.0]]).T
     / 6.0
 )
-NODES = 4  # of Gauss and Legendre: exact for the squares of cubics
+# So many nodes of Gauss and Legendre are exact for the squares of cubics.
+NODE_COUNT = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Where the splines stand: origin (2,) is the corner of the first cell, step (2,) a cell's size, shape
-    how many splines in x, in y.
+    """Where the splines stand.
 
-    Raises InputError for fewer than four splines in a direction or a cell without size.
+    Attributes:
+        origin: the corner of the first cell, (2,).
+        step: a cell's size, (2,).
+        shape: how many splines there are in x and in y.
+    Raises:
+        InputError: fewer than four splines in a direction, or a cell without size.
     """
 
     origin: ndarray
@@ -46,7 +52,7 @@ class Lattice:
         object.__setattr__(self, "origin", frozen(self.origin, (2,), "lattice: origin"))
         object.__setattr__(self, "step", frozen(self.step, (2,), "lattice: step"))
         object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
-        if min(self.shape) < ACROSS or not (self.step > 0).all():
+        if min(self.shape) < SPLINES_ACROSS_CELL or not (self.step > 0).all():
             raise InputError(
                 f"a lattice of {self.shape} splines with steps {self.step} is none; expected at least 4 each"
                 " way, steps above 0."
@@ -54,11 +60,19 @@ class Lattice:
 
     @classmethod
     def over(cls, low: Float[ndarray, " 2"], high: Float[ndarray, " 2"], cells: tuple[int, int]) -> Lattice:
-        """The lattice whose splines make every bicubic function of so many cells over the rectangle from low
-        to high.
+        """The lattice whose splines make every bicubic function of so many cells over a rectangle.
+
+        Args:
+            low: its corner with the least x and y, (2,).
+            high: its corner with the greatest, (2,).
+            cells: how many in x and in y.
         """
         low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-        return cls(low, (high - low) / cells, (cells[0] + ACROSS - 1, cells[1] + ACROSS - 1))
+        return cls(
+            low,
+            (high - low) / cells,
+            (cells[0] + SPLINES_ACROSS_CELL - 1, cells[1] + SPLINES_ACROSS_CELL - 1),
+        )
 
     def seen_from(self, scale: Float[ndarray, " 2"], shift: Float[ndarray, " 2"]) -> Lattice:
         """The same lattice where places of the plane are written scale * place + shift."""
@@ -75,14 +89,17 @@ class Lattice:
         return (down[..., :, None] * across[..., None, :]).reshape(*x.shape, self.splines)
 
     def along(self, places: ndarray, axis: int) -> tuple[ndarray, ndarray]:
-        """Values and slopes (..., n) of the n splines of one direction, 0 for x and 1 for y, at places of any
-        shape (...).
+        """Values and slopes (..., n) of the n splines of one direction.
 
         With a the distance from a spline's middle in cells: ((2 - a)+^3 - 4 (1 - a)+^3) / 6. Zero where a
         place is no number.
+
+        Args:
+            places: coordinates along the direction, of any shape (...).
+            axis: the direction, 0 for x and 1 for y.
         """
         t = (places - self.origin[axis]) / self.step[axis] + 1.0
-        offset = np.nan_to_num(t, nan=-ACROSS)[..., None] - np.arange(self.shape[axis])
+        offset = np.nan_to_num(t, nan=-SPLINES_ACROSS_CELL)[..., None] - np.arange(self.shape[axis])
         distance = np.abs(offset)
         outer, inner = np.maximum(2.0 - distance, 0.0), np.maximum(1.0 - distance, 0.0)
         outer_squared, inner_squared = outer * outer, inner * inner
@@ -91,23 +108,29 @@ class Lattice:
         return values, slopes
 
     def energy(self, reach: float) -> Float[ndarray, "g g"]:
-        """The matrix E of the roughness c'Ec, in the module's words; reach: its range l, in the plane's unit.
+        """The matrix E of the roughness c'Ec, the energy in the module's docstring.
 
         Scaled so that a displacement drawn from exp(-c'Ec / 2) has about unit variance in the middle of the
         lattice.
+
+        Args:
+            reach: the range l, in the plane's unit.
         """
         (x0, x1, x2), (y0, y1, y2) = (_grams(self.shape[axis], float(self.step[axis])) for axis in (0, 1))
         energy = np.kron(y0, x0) / reach**4 + 2.0 / reach**2 * (np.kron(y0, x1) + np.kron(y1, x0))
         energy += np.kron(y0, x2) + 2.0 * np.kron(y1, x1) + np.kron(y2, x0)
-        middle = self.origin + 0.5 * self.step * (np.array(self.shape) - ACROSS + 1)
+        middle = self.origin + 0.5 * self.step * (np.array(self.shape) - SPLINES_ACROSS_CELL + 1)
         there = self.design(middle[:1], middle[1:])[0]
         return energy * float(there @ np.linalg.solve(energy, there))
 
 
 @dataclass(frozen=True, eq=False)
 class Displacement:
-    """s(x, y): how places of a plane are moved. coefficients: (splines, 2), of x and of y, in the plane's
-    unit.
+    """s(x, y): how places of a plane are moved.
+
+    Attributes:
+        lattice: where the splines stand.
+        coefficients: (splines, 2), of x and of y, in the plane's unit.
     """
 
     lattice: Lattice
@@ -135,18 +158,16 @@ class Displacement:
 
 
 def _grams(splines: int, step: float) -> tuple[ndarray, ndarray, ndarray]:
-    """Integrals over the lattice's cells of products of two splines, of their slopes, of their second
-    derivatives.
-    """
-    nodes, shares = np.polynomial.legendre.leggauss(NODES)
+    """Integrals over the lattice's cells of products of two splines, of slopes, of second derivatives."""
+    nodes, shares = np.polynomial.legendre.leggauss(NODE_COUNT)
     powers = np.vander(0.5 * (nodes + 1.0), 4, increasing=True)
     grams = []
     for order in range(3):
-        derived = np.polynomial.polynomial.polyder(WEIGHTS, order)
+        derived = np.polynomial.polynomial.polyder(PIECE_WEIGHTS, order)
         values = powers[:, : len(derived)] @ derived / step**order
         piece = values.T @ (0.5 * step * shares[:, None] * values)
         gram = np.zeros((splines, splines))
-        for first in range(splines - ACROSS + 1):
-            gram[first : first + ACROSS, first : first + ACROSS] += piece
+        for first in range(splines - SPLINES_ACROSS_CELL + 1):
+            gram[first : first + SPLINES_ACROSS_CELL, first : first + SPLINES_ACROSS_CELL] += piece
         grams.append(gram)
     return grams[0], grams[1], grams[2]

@@ -18,24 +18,23 @@ from orthoscope.geometry.pose import nearest_rotation
 
 __all__ = ["SHAPES", "TargetShape", "polynomials", "without_similarity"]
 
+# The kinds of shape, from the stiffest to the softest.
 SHAPES = ("flat", "smooth", "free")
-ORDERS = (
-    1,
-    2,
-    3,
-    4,
-)  # of a smooth surface: a sheet that was stretched, hangs or curls; waves are for single corners
-TOLD = (
-    1e-6  # a polynomial that differs from those before it by less than this share of its size is one of them
-)
+# A smooth surface has these orders: a sheet was stretched, hangs or curls; waves are for single corners.
+SMOOTH_ORDERS = (1, 2, 3, 4)
+# A polynomial that differs from those before it by less than this share of its size is one of them.
+LEAST_DIFFERENCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class TargetShape:
-    """kind: one of SHAPES. displacements: (m,3) metres, target frame, from nominal to real; 0 for corners
-    that were never seen.
+    """Where the corners of a target are.
 
-    Raises InputError for another kind, or a flat target whose corners are displaced.
+    Attributes:
+        kind: one of SHAPES.
+        displacements: (m,3) metres, target frame, from nominal to real; 0 for corners that were never seen.
+    Raises:
+        InputError: another kind, or a flat target whose corners are displaced.
     """
 
     kind: str
@@ -61,7 +60,7 @@ class TargetShape:
 
     @classmethod
     def flat(cls, corners: int) -> TargetShape:
-        """The target as it is said to be."""
+        """The shape of a target with so many corners that is as it is said to be."""
         return cls("flat", np.zeros((corners, 3)))
 
     @property
@@ -79,11 +78,16 @@ class TargetShape:
 def without_similarity(
     points: Float[ndarray, "m 3"], displacements: Float[ndarray, "m 3"], seen: ndarray
 ) -> Float[ndarray, "m 3"]:
-    """The same shape, moved, turned and scaled as a whole to where it is nearest to its nominal points; 0 for
-    corners that were not seen.
+    """The displacements once the whole is moved, turned and scaled to where it is nearest to nominal.
 
-    seen: (m,) bool, at least three corners off a line. S. Umeyama, Least-squares estimation of
-    transformations, TPAMI 13(4), 1991.
+    Args:
+        points: the nominal ones, (m,3) metres.
+        displacements: from nominal to real, (m,3) metres.
+        seen: (m,) bool, at least three corners off a line.
+    Returns:
+        (m,3) metres; 0 for corners that were not seen.
+    Source:
+        S. Umeyama, Least-squares estimation of transformations, TPAMI 13(4), 1991.
     """
     nominal, real = points[seen], points[seen] + displacements[seen]
     centre = real.mean(0)
@@ -96,12 +100,16 @@ def without_similarity(
 
 
 def polynomials(
-    points: Float[ndarray, "m 3"], seen: ndarray, *, orders: Sequence[int] = ORDERS
+    points: Float[ndarray, "m 3"], seen: ndarray, *, orders: Sequence[int] = SMOOTH_ORDERS
 ) -> Float[ndarray, "m r"]:
-    """Polynomials of the target's plane, orthogonal over the seen corners and of mean square 1 there; 0 at
-    corners that were not seen.
+    """Polynomials of the target's plane, orthogonal over the seen corners and of mean square 1 there.
 
-    seen: (m,) bool.  orders: which are wanted.  Fewer where the seen corners cannot tell them apart.
+    Args:
+        points: the nominal ones, (m,3) metres.
+        seen: (m,) bool.
+        orders: which are wanted.
+    Returns:
+        A column each, 0 at corners that were not seen; fewer where the seen corners cannot tell them apart.
     """
     plane = points[:, :2] - points[seen, :2].mean(0)
     x, y = (plane / np.abs(plane[seen]).max()).T
@@ -112,7 +120,7 @@ def polynomials(
         for _ in range(2):  # what rounding leaves the first time goes the second
             rest = rest - (before @ rest) @ before
         size = np.sqrt(rest @ rest)
-        if size > TOLD * np.sqrt(seen.sum()):
+        if size > LEAST_DIFFERENCE * np.sqrt(seen.sum()):
             found[len(wanted)] = rest / size
             wanted.append(i + j in orders)
     return np.ascontiguousarray(found[: len(wanted)][wanted].T) * np.sqrt(seen.sum())

@@ -6,14 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orthoscope.paper.claims import Claim, Verdict, share
+from orthoscope.paper.claims import Claim, ClaimVerdict, share
 from orthoscope.paper.eq7_searches import Eq7Search
 from orthoscope.paper.wording import span
 
-__all__ = ["determined", "perfect"]
+__all__ = ["determined", "perfect", "weights_do_not_matter"]
 
 PERFECT = 1e-10  # px^2: J of eq. (7)
 SAME = 0.01  # px: cameras that differ by less are one camera
+ONE_PIXEL = 1.0  # of fx, fy, cx or cy: less does not count as a change
 ACCURATE = 1.0  # NCE of rounding to whole pixels
 
 
@@ -22,7 +23,7 @@ def perfect(where: str, members: Sequence[Eq7Search]) -> Claim:
     paper = "The search always converges to points which satisfy all template restrictions perfectly."
     costs = np.array([member.J for member in members if member.literal])
     if not len(costs):
-        return Claim(where, paper, Verdict.OPEN, "Eq. (7) was not searched.")
+        return Claim(where, paper, ClaimVerdict.OPEN, "Eq. (7) was not searched.")
     ended = int((costs < PERFECT).sum())
     finding = (
         f"J ends below {PERFECT:g} in {ended} of {len(costs)} searches; its largest end is {costs.max():.0e}."
@@ -42,7 +43,7 @@ def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
         if member.literal and member.J < PERFECT and not member.judgement.failure
     ]
     if len(ends) < 2:
-        return Claim(where, paper, Verdict.OPEN, "Fewer than two searches ended at J = 0.")
+        return Claim(where, paper, ClaimVerdict.OPEN, "Fewer than two searches ended at J = 0.")
     cameras = np.array([(end.fx, end.fy, end.cx, end.cy) for end in ends])
     apart = float(np.ptp(cameras, axis=0).max())
     of_each = ", ".join(
@@ -51,10 +52,36 @@ def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
     )
     nce = np.array([end.test_nce for end in ends])
     one = apart < SAME
-    verdict = Verdict.FAILS if not one else Verdict.HOLDS if (nce < ACCURATE).all() else Verdict.PARTLY
+    verdict = (
+        ClaimVerdict.FAILS
+        if not one
+        else ClaimVerdict.HOLDS
+        if (nce < ACCURATE).all()
+        else ClaimVerdict.PARTLY
+    )
     where_to = "one camera" if one else "different cameras"
     finding = (
         f"{len(ends)} searches of the same data, all with J < {PERFECT:g}, end at {where_to}: {of_each} px, "
         f"up to {apart:.2g} px apart; test NCE {span(nce)}."
     )
     return Claim(where, paper, verdict, finding)
+
+
+def weights_do_not_matter(where: str, members: Sequence[Eq7Search]) -> Claim:
+    """The outcome does not depend on the weights; members of one scene, those of one damping."""
+    paper = "The computed pin-hole model does not depend on the weights of the terms of eq. (7)."
+    weighed = [member for member in members if member.literal and "weights" in member.name]
+    damped = {member.name.split(", weights")[0] for member in weighed}
+    plain = [member for member in members if member.literal and member.name in damped]
+    ends = [m.judgement for m in (*plain, *weighed) if not m.judgement.failure]
+    if len(ends) < 2 or not plain:
+        return Claim(where, paper, ClaimVerdict.OPEN, "Eq. (7) was not searched with other weights.")
+    cameras = np.array([(end.fx, end.fy, end.cx, end.cy) for end in ends])
+    moved = np.abs(cameras[1:] - cameras[0]).max(1)
+    each = ", ".join(
+        f"{m.name.split('weights ')[1]}: {px:.2g} px" for m, px in zip(weighed, moved, strict=False)
+    )
+    verdict = share(int((moved < ONE_PIXEL).sum()), len(moved))
+    return Claim(
+        where, paper, verdict, f"Against weights 1 1 1 the camera moves, with J_PH, J_CR, J_ST at {each}."
+    )

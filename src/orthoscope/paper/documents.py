@@ -9,15 +9,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from orthoscope.paper.claims import headline
+from orthoscope.paper.claims import main_headline
 from orthoscope.paper.curves import curves_of
+from orthoscope.paper.entries import PAPER, fair_peers
 from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
     figures_with_claims,
     on_photographs,
-    parameters_of,
+    parameter_columns,
 )
-from orthoscope.paper.files import curves_csv, members_csv, table_csv, trials_csv
+from orthoscope.paper.files import curves_csv, entries_csv, members_csv, table_csv, trials_csv
 from orthoscope.paper.page import paper_page
 from orthoscope.paper.photographs import straightened
 from orthoscope.paper.section4 import SCENES, Results
@@ -51,6 +52,7 @@ def documents(results: Results, files: Mapping[str, Path] | None = None) -> Docu
         )
         for scene in SCENES
     }
+    texts["methods.csv"] = entries_csv((*PAPER, *fair_peers()), seed=results.plan.seed)
     texts["eq7.csv"] = members_csv(results.members)
     if real:
         texts["table1.csv"] = _table1(results)
@@ -59,7 +61,7 @@ def documents(results: Results, files: Mapping[str, Path] | None = None) -> Docu
 
 
 def _headline(shown: list[FigureWithClaims]) -> str:
-    return headline([claim for exhibit in shown for claim in exhibit.claims])
+    return main_headline([claim for exhibit in shown for claim in exhibit.claims])
 
 
 def _table1(results: Results) -> str:
@@ -74,6 +76,6 @@ def _table1(results: Results) -> str:
             column.test_nce,
             column.failures,
         )
-        for column in parameters_of(results)
+        for column in parameter_columns(results)
     ]
     return table_csv(("method", *spread, "training_nce", "test_nce", "failures"), rows)

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["each_of", "listed", "number", "span", "times"]
+__all__ = ["each_of", "joined_words", "short_number", "span", "times"]
 
 DECIMALS = ((0.1, 3), (10.0, 2), (1e4, 0))  # below this size, so many
 
 
-def number(value: float) -> str:
+def short_number(value: float) -> str:
     """An NCE, or a change of one, in as many digits as one reads."""
     for limit, decimals in DECIMALS:
         if abs(value) < limit:
@@ -22,20 +22,20 @@ def number(value: float) -> str:
 def span(values: Float[ndarray, " n"], *, decimals: int | None = None) -> str:
     """The least and the greatest of some numbers; one of them where they read alike."""
     low, high = (
-        number(float(value)) if decimals is None else f"{value:.{decimals}f}"
+        short_number(float(value)) if decimals is None else f"{value:.{decimals}f}"
         for value in (values.min(), values.max())
     )
     return low if low == high else f"{low} to {high}"
 
 
-def listed(words: Sequence[str]) -> str:
+def joined_words(words: Sequence[str]) -> str:
     """One, two and three."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
 def each_of(values: Mapping[str, float]) -> str:
     """A number for each name."""
-    return listed([f"{number(value)} for {name}" for name, value in values.items()])
+    return joined_words([f"{short_number(value)} for {name}" for name, value in values.items()])
 
 
 def times(mine: float, theirs: float) -> str:

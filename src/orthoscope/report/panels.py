@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.report.data.boards import boards
 from orthoscope.report.data.choice import choice
-from orthoscope.report.data.frame_fields import difference, displacement, lens_misfit
+from orthoscope.report.data.frame_fields import difference, displacement, lens_misfit_data
 from orthoscope.report.data.lens_curve import curve
-from orthoscope.report.data.target import target_misfit, target_shape
+from orthoscope.report.data.target import target_misfit_data, target_shape_data
+from orthoscope.report.data.trust import without_each
 
 __all__ = ["PANELS", "Panel"]
 
@@ -50,6 +51,15 @@ PANELS = (
         wide=True,
     ),
     Panel(
+        "without-each",
+        "Without each photograph",
+        "How far the camera's image moves, over the part that was seen, where one photograph is left out. Far"
+        " above the others: the camera rests on this one; take more like it.",
+        "Bar chart of how far the camera moves without each photograph",
+        without_each,
+        wide=True,
+    ),
+    Panel(
         "vectors",
         "Residual vectors",
         "From each detected corner to where the camera predicts it. Disorder is good; long arrows side by"
@@ -77,7 +87,7 @@ PANELS = (
         "Where the corners were found to be, displacements magnified: the calibration has taken this into"
         " account.",
         "The target's corners in three dimensions",
-        target_shape,
+        target_shape_data,
     ),
     Panel(
         "target-misfit",
@@ -85,7 +95,7 @@ PANELS = (
         "Where corners seem to be against where they are taken to be, as far as photographs agree. A pattern"
         " is a bent or badly printed target.",
         "The target's corners in three dimensions, with displacements that the calibration has not followed",
-        target_misfit,
+        target_misfit_data,
     ),
     Panel(
         "lens-misfit",
@@ -93,7 +103,7 @@ PANELS = (
         "What stays the same at a place of the image, whichever corner is there: what the lens formula cannot"
         " follow.",
         "Map over the frame of what photographs agree on",
-        lens_misfit,
+        lens_misfit_data,
     ),
     Panel(
         "curve",

@@ -21,15 +21,15 @@ from orthoscope.report.snippets import snippets
 from orthoscope.targets.detections import Detections
 
 __all__ = [
-    "before_and_after",
+    "before_and_after_section",
     "closing",
     "figure",
     "figures",
     "first_screen",
     "key_figures",
-    "numbers",
+    "numbers_section",
     "opening",
-    "photographs",
+    "photographs_section",
     "set_aside",
     "what_to_know",
 ]
@@ -55,13 +55,14 @@ def opening(evaluation: Evaluation) -> Html:
     width, height = detections.image_size
     facts = (
         f"{_count(len(detections.views), 'photograph')} of {detections.target.name} · {width} × {height}"
-        f" pixels · lens {tables.lens_name(calibration.camera)} · method {calibration.method}"
+        f" pixels · lens {tables.lens_in_words(calibration.camera)} · method {calibration.method}"
     )
     grade = tag("span", tag("span", told.sign, aria_hidden="true"), " ", told.grade, class_="grade")
     return tag(
         "header",
         tag("p", "orthoscope · calibration report", class_="kicker"),
         tag("h1", grade, " ", tag("span", told.sentence)),
+        tag("p", told.limit, class_="limit") if told.limit else None,
         tag("p", facts, class_="facts"),
         class_=f"grade-{told.look}",
     )
@@ -174,7 +175,7 @@ def what_to_know(evaluation: Evaluation) -> Html | None:
     return tag("section", tag("h2", "What to know"), told, class_="panel") if told else None
 
 
-def photographs(evaluation: Evaluation, pictures: Pictures) -> Html:
+def photographs_section(evaluation: Evaluation, pictures: Pictures) -> Html:
     """Each photograph with its errors; opened, with corners and residuals; a switch takes it out."""
     shots = []
     for row in tables.view_rows(evaluation):
@@ -265,7 +266,7 @@ def _empty(name: str, title: str, why: str) -> Html:
     return tag("div", tag("h2", title), tag("p", why, class_="note"), id=name, class_="panel empty")
 
 
-def before_and_after(pictures: Pictures) -> Html | None:
+def before_and_after_section(pictures: Pictures) -> Html | None:
     """One photograph as it was taken, and straight."""
     if pictures.large is None:
         return None
@@ -286,7 +287,7 @@ def before_and_after(pictures: Pictures) -> Html | None:
     )
 
 
-def numbers(evaluation: Evaluation) -> Html:
+def numbers_section(evaluation: Evaluation) -> Html:
     """Parameters, lens, target and misfits as tables."""
     calibration = evaluation.calibration
     parameters = [
@@ -315,7 +316,7 @@ def numbers(evaluation: Evaluation) -> Html:
         ),
         tag(
             "div",
-            tag("h2", f"Lens: {tables.lens_name(calibration.camera)}"),
+            tag("h2", f"Lens: {tables.lens_in_words(calibration.camera)}"),
             table((), tables.lens_rows(calibration), class_="facts-table"),
             (
                 [

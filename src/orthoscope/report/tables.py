@@ -23,7 +23,7 @@ from orthoscope.geometry.numbers import (
 )
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import lens_name as lens_kind
+from orthoscope.models.lenses import lens_name
 from orthoscope.report.field_of_view import field_of_view
 
 __all__ = [
@@ -35,7 +35,7 @@ __all__ = [
     "camera_line",
     "candidate_rows",
     "cards",
-    "lens_name",
+    "lens_in_words",
     "lens_rows",
     "misfit_rows",
     "parameters",
@@ -267,10 +267,10 @@ def settings_rows(calibration: Calibration) -> list[tuple[str, str]]:
     return [(str(name), setting(value)) for name, value in calibration.settings.items()]
 
 
-def lens_name(camera: Camera) -> str:
+def lens_in_words(camera: Camera) -> str:
     """The lens's name in the table of lenses, or what a free lens stands on."""
     lens = camera.lens
-    return f"free, on {lens_kind(lens.base)}" if isinstance(lens, FreeLens) else lens_kind(lens)
+    return f"free, on {lens_name(lens.base)}" if isinstance(lens, FreeLens) else lens_name(lens)
 
 
 def _held_out(evaluation: Evaluation) -> Card:

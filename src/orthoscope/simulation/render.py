@@ -26,7 +26,7 @@ from orthoscope.simulation.scene import Scene, random_views
 from orthoscope.simulation.sheet import Sheet
 from orthoscope.targets.target import Target, chessboard
 
-__all__ = ["Renderer", "demo_scene", "photographs", "render"]
+__all__ = ["Renderer", "demo_scene", "render", "rendered_photographs"]
 
 ROWS = 32  # rows drawn at once, so that intermediate arrays stay small
 BLACK, WHITE, BACKGROUND = 15.0, 200.0, 90.0  # grey levels before light, vignetting and noise
@@ -38,10 +38,15 @@ MID_GREY = 128.0  # where `noise` is meant; half of its variance is read noise, 
 class Renderer:
     """A camera ready to photograph: what is the same in every photograph is computed once.
 
-    oversampling: sub-samples along a pixel's side where an edge crosses it. blur_px: sigma of the blur,
-    pixels. vignetting: share of the light that the farthest corner loses. noise: standard deviation at
-    mid-grey, grey levels. light: how much brighter one side is lit than the other, as a share. Raises
-    InputError for values out of range.
+    Args:
+        camera: which takes them.
+        oversampling: sub-samples along a pixel's side where an edge crosses it.
+        blur_px: sigma of the blur, pixels.
+        vignetting: share of the light that the farthest corner loses.
+        noise: standard deviation at mid-grey, grey levels.
+        light: how much brighter one side is lit than the other, as a share.
+    Raises:
+        InputError: values out of range.
     """
 
     camera: Camera
@@ -67,8 +72,13 @@ class Renderer:
     ) -> ndarray:
         """One photograph, (h,w) uint8; black where a pixel has no ray.
 
-        rng: where background, light and noise come from; without it the background is plain, the light even
-        and there is no noise. Raises InputError for a target that cannot be drawn.
+        Args:
+            target: what it shows.
+            camera_from_target: where that stands.
+            rng: where background, light and noise come from; without it the background is plain, the light
+                even and there is no noise.
+        Raises:
+            InputError: the target cannot be drawn.
         """
         sheet = Sheet(target.drawing(), black=BLACK, white=WHITE)
         image = (
@@ -180,7 +190,7 @@ def render(
     return renderer.photograph(target, camera_from_target, rng=rng)
 
 
-def photographs(
+def rendered_photographs(
     scene: Scene, *, rng: np.random.Generator, renderer: Renderer | None = None
 ) -> Iterator[tuple[str, ndarray]]:
     """Name and photograph (h,w) uint8 of each view of a scene, one after the other; renderer: by default with

@@ -28,17 +28,26 @@ __all__ = ["NormalEquations", "Options", "Problem", "Solution", "Status", "share
 
 Unknowns = TypeVar("Unknowns")
 
+# Damping stays within these two.
 LEAST_DAMPING, MOST_DAMPING = 1e-15, 1e12
-# an eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured in its
-# direction
-OPEN = 1e-14
-TAKES_PART = 1e-8  # share (squared) of such a direction from which on an unknown is open too
+# An eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured there.
+LARGEST_OPEN_EIGENVALUE = 1e-14
+# An unknown that has at least this share (squared) in such a direction is open too.
+OPEN_SHARE = 1e-8
 
 
 class NormalEquations(NamedTuple):
-    """The sums at one place: cost is the sum of rho, the rest as in the module's docstring.
+    """The sums at one place, as in the module's docstring.
 
     There may be no views (m = 0), no shared unknowns (k = 0) and view blocks of any width p.
+
+    Attributes:
+        cost: the sum of rho over all measurements, in the residual's unit squared.
+        A: shared with shared unknowns, (k,k).
+        a: shared unknowns with the residuals, (k,).
+        B: shared with each view's unknowns, (m,k,p).
+        C: each view's unknowns with themselves, (m,p,p).
+        c: each view's unknowns with the residuals, (m,p).
     """
 
     cost: float
@@ -53,13 +62,24 @@ class Problem(Protocol[Unknowns]):
     """What `solve` needs of a problem."""
 
     def linearise(self, unknowns: Unknowns, loss: Loss) -> NormalEquations:
-        """The sums at `unknowns`; a cost that is not finite says that there is no solution there."""
+        """The sums at a place; a cost that is not finite says that there is no solution there.
+
+        Args:
+            unknowns: the place.
+            loss: what a squared residual costs.
+        """
         ...
 
     def move(
         self, unknowns: Unknowns, shared: Float[ndarray, " k"], views: Float[ndarray, "m p"]
     ) -> Unknowns:
-        """The unknowns after a step (rotations step on their manifold)."""
+        """The unknowns after a step (rotations step on their manifold).
+
+        Args:
+            unknowns: those before it.
+            shared: the shared step s, (k,).
+            views: each view's step, (m,p).
+        """
         ...
 
 
@@ -79,12 +99,17 @@ class Status(StrEnum):
 class Options:
     """How to solve.
 
-    tolerance: stop when a step promises to lower the cost by no more than this share of it. floor: or by no
-    more than this, absolutely, in the residual's unit squared (noise-free data). damping: lambda at the
-    start. damp: "diagonal" or "identity". trusting: whether the last step, known by how promises shrink, is
-    taken without forming the sums after it; the solution's are then those before it, and its cost is what
-    that step promised. progress: called after each step that lowered the cost, with (step, cost). Raises
-    InputError where damp is another word.
+    Attributes:
+        max_steps: how many steps are tried at most.
+        tolerance: a step that promises to lower the cost by no more than this share of it is the end.
+        floor: so is one that promises no more than this, in the residual's unit squared (noise-free data).
+        damping: lambda at the start.
+        damp: what lambda is multiplied by, "diagonal" or "identity".
+        trusting: whether the last step, known by how promises shrink, is taken without forming the sums after
+            it; the solution's sums are then those before it, and its cost is what that step promised.
+        progress: called with (step, cost) after each step that lowered the cost.
+    Raises:
+        InputError: damp is another word.
     """
 
     max_steps: int = 100
@@ -102,7 +127,14 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Solution(Generic[Unknowns]):
-    """Where a solve ended: the unknowns, the sums there, how many steps were tried and why it stopped."""
+    """Where a solve ended.
+
+    Attributes:
+        unknowns: what was found.
+        sums: those at the unknowns.
+        steps: how many were tried.
+        status: why it stopped.
+    """
 
     unknowns: Unknowns
     sums: NormalEquations
@@ -118,8 +150,15 @@ class Solution(Generic[Unknowns]):
 def solve(
     problem: Problem[Unknowns], start: Unknowns, *, loss: Loss | None = None, options: Options | None = None
 ) -> Solution[Unknowns]:
-    """The unknowns that minimise the problem's cost, near the start; the solution's status says how it
-    ended.
+    """The unknowns that minimise the problem's cost, near the start.
+
+    Args:
+        problem: forms the sums at a place and moves along a step.
+        start: the unknowns to begin with.
+        loss: what a squared residual costs; least squares by default.
+        options: how to solve.
+    Returns:
+        The place with the least cost that was met; its status says how the solve ended.
     """
     loss, options = loss or Linear(), options or Options()
     here, sums = start, problem.linearise(start, loss)
@@ -154,24 +193,33 @@ def solve(
 def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray, "k k"]:
     """Covariance of the shared unknowns for noise as large as the residuals found.
 
-    measurements: how many numbers were measured (two for each corner). The variance is cost / (measurements -
-    unknowns). Rows and columns of unknowns that the data leave open are infinite.
+    The variance of the noise is cost / (measurements - unknowns).
+
+    Args:
+        sums: those at the solution.
+        measurements: how many numbers were measured (two for each corner).
+    Returns:
+        (k,k); rows and columns of unknowns that the data leave open are infinite.
     """
     unknowns = sums.a.size + sums.c.size
     variance = sums.cost / max(measurements - unknowns, 1)
     eliminated, _ = _eliminate(sums, sums.A, _inverse(sums.C))
-    # conditioning is judged between unknowns of like size
+    # Conditioning is judged between unknowns of like size.
     scale = np.sqrt(_weights(sums.A, "diagonal"))
     values, vectors = np.linalg.eigh(eliminated / np.outer(scale, scale))
-    covariance = variance * (vectors / np.maximum(values, OPEN)) @ vectors.T / np.outer(scale, scale)
-    is_open = (vectors[:, values <= OPEN] ** 2).sum(1) > TAKES_PART
+    covariance = (
+        variance
+        * (vectors / np.maximum(values, LARGEST_OPEN_EIGENVALUE))
+        @ vectors.T
+        / np.outer(scale, scale)
+    )
+    is_open = (vectors[:, values <= LARGEST_OPEN_EIGENVALUE] ** 2).sum(1) > OPEN_SHARE
     covariance[is_open] = covariance[:, is_open] = np.inf
     return covariance
 
 
 class _Damping:
-    """lambda, after Nielsen: less the better a step kept its promise, more and ever faster after steps that
-    raised the cost.
+    """lambda, after Nielsen: less the better a step kept its promise, ever more after steps up the cost.
 
     Faster than his: a narrow valley (rational lenses have them) is walked with hardly any damping and left
     with a lot.
@@ -193,8 +241,9 @@ class _Damping:
 def _ending(
     sums: NormalEquations, promised: float, damping: float, steps: int, options: Options
 ) -> Status | None:
-    """Whether to end, and how: a damped step that promises nothing is only a minimum if one as free as the
-    first promises nothing too.
+    """How to end here, or None to go on.
+
+    A damped step that promises nothing marks a minimum only if one as free as the first promises nothing too.
     """
     if _is_little(promised, sums, options):
         free = (
@@ -214,8 +263,9 @@ def _is_little(promised: float, sums: NormalEquations, options: Options) -> bool
 def _last_step(
     sums: NormalEquations, promised: float, before: float, options: Options
 ) -> tuple[ndarray, ndarray, float] | None:
-    """The undamped step, where promises that go on shrinking as they have since the step `before` are little
-    after it; else None.
+    """The undamped step and its promise, if it is the last one; else None.
+
+    It is where promises that go on shrinking as they have since the one `before` are little after it.
     """
 
     def is_last(promised: float) -> bool:
@@ -223,9 +273,8 @@ def _last_step(
 
     if not is_last(promised):
         return None
-    step = _damped_step(
-        sums, LEAST_DAMPING, options.damp
-    )  # in a flat valley it is the damping that makes a promise small
+    # In a flat valley it is the damping that makes a promise small, so the last step has none.
+    step = _damped_step(sums, LEAST_DAMPING, options.damp)
     return step if is_last(step[2]) else None
 
 
@@ -235,9 +284,7 @@ def _lowered(sums: NormalEquations, promised: float) -> NormalEquations:
 
 
 def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndarray, ndarray, float]:
-    """Shared step, view steps, and the reduction of the cost that the quadratic model promises; NaN where
-    there is no such step.
-    """
+    """Shared step, view steps and what the quadratic model promises to take off the cost; NaN for no step."""
     of_shared, of_views = damping * _weights(sums.A, damp), damping * _weights(sums.C, damp)
     try:
         inverse = np.linalg.inv(sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2]))
@@ -251,8 +298,12 @@ def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndar
 
 
 def _eliminate(sums: NormalEquations, A: ndarray, inverse: ndarray) -> tuple[ndarray, ndarray]:
-    """The shared system and its right side after the views are eliminated. inverse: C^-1 of each view; it and
-    A may be damped.
+    """The shared system and its right side after the views are eliminated.
+
+    Args:
+        sums: of which B, a and c are used.
+        A: the shared block, which may be damped.
+        inverse: C^-1 of each view, (m,p,p), C perhaps damped.
     """
     m, k, p = sums.B.shape
     B = sums.B.transpose(1, 0, 2).reshape(k, m * p)
@@ -261,16 +312,14 @@ def _eliminate(sums: NormalEquations, A: ndarray, inverse: ndarray) -> tuple[nda
 
 
 def _inverse(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:
-    """The inverse of each block; in a direction where nothing was measured, what rounding would have measured
-    there.
-    """
+    """The inverse of each block; where nothing was measured, of what rounding would have measured there."""
     scale = np.sqrt(_weights(C, "diagonal"))
     values, vectors = np.linalg.eigh(C / (scale[:, :, None] * scale[:, None, :]))
     vectors = vectors / scale[:, :, None]
-    return (vectors / np.maximum(values, OPEN)[:, None]) @ vectors.transpose(0, 2, 1)
+    return (vectors / np.maximum(values, LARGEST_OPEN_EIGENVALUE)[:, None]) @ vectors.transpose(0, 2, 1)
 
 
 def _weights(block: ndarray, damp: str) -> ndarray:
-    """What damping is multiplied by on the diagonal of a block (or of each of a stack)."""
+    """What damping is multiplied by on the diagonal of a block, or of each of a stack of blocks."""
     diagonal = np.diagonal(block, axis1=-2, axis2=-1)
     return np.maximum(diagonal, 1e-12) if damp == "diagonal" else np.ones_like(diagonal)

@@ -18,7 +18,13 @@ __all__ = ["LOSSES", "Cauchy", "Huber", "Linear", "Loss"]
 
 @dataclass(frozen=True)
 class Loss(ABC):
-    """A cost of squared residuals; scale: where it starts to matter, in the residual's unit."""
+    """A cost of squared residuals.
+
+    Attributes:
+        scale: the residual from which on the loss forgives, in the residual's unit.
+    Raises:
+        InputError: the scale is not positive.
+    """
 
     scale: float = 1.0
 
@@ -29,43 +35,43 @@ class Loss(ABC):
             )
 
     @abstractmethod
-    def cost(self, squared: ndarray) -> ndarray:
+    def cost(self, squared: ndarray) -> ndarray | np.float64:
         """rho(q) of squared residuals q >= 0."""
 
     @abstractmethod
     def weight(self, squared: ndarray) -> ndarray | None:
-        """d rho / d q; None where it is 1 everywhere."""
+        """d rho / d q of squared residuals q >= 0; None where it is 1 everywhere."""
 
 
 class Linear(Loss):
     """Least squares."""
 
-    def cost(self, squared):
+    def cost(self, squared: ndarray) -> ndarray:
         return squared
 
-    def weight(self, squared):
+    def weight(self, squared: ndarray) -> None:
         return None
 
 
 class Huber(Loss):
     """Squares near, absolute values far."""
 
-    def cost(self, squared):
+    def cost(self, squared: ndarray) -> ndarray:
         c = self.scale
         return np.where(squared <= c * c, squared, 2.0 * c * np.sqrt(squared) - c * c)
 
-    def weight(self, squared):
+    def weight(self, squared: ndarray) -> ndarray:
         return np.minimum(1.0, self.scale / np.sqrt(np.maximum(squared, 1e-300)))
 
 
 class Cauchy(Loss):
     """Squares near, logarithm far: a gross error is all but forgotten."""
 
-    def cost(self, squared):
+    def cost(self, squared: ndarray) -> ndarray | np.float64:
         c2 = self.scale**2
         return c2 * np.log1p(squared / c2)
 
-    def weight(self, squared):
+    def weight(self, squared: ndarray) -> ndarray:
         return 1.0 / (1.0 + squared / self.scale**2)
 
 

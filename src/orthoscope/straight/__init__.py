@@ -1,0 +1,1 @@
+"""Photographs and films without their distortion."""

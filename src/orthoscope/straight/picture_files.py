@@ -20,7 +20,7 @@ from orthoscope.files.images import SUFFIXES, checked_whole, quiet
 from orthoscope.files.whole_files import read_bytes
 from orthoscope.geometry.arrays import InputError, ndarray
 
-__all__ = ["Picture", "encoded", "read_picture"]
+__all__ = ["PictureFile", "encoded", "read_picture"]
 
 # Channels that cv2.remap maps at once, and depths that it knows.
 MOST_CHANNELS = 4
@@ -28,7 +28,7 @@ DEPTHS = ("uint8", "uint16", "int16", "float32", "float64")
 JPEG_QUALITY = 95
 
 
-class Picture(NamedTuple):
+class PictureFile(NamedTuple):
     """A picture and the file that it came in.
 
     Args:
@@ -43,7 +43,7 @@ class Picture(NamedTuple):
     suffix: str
 
 
-def read_picture(path: Path) -> Picture:
+def read_picture(path: Path) -> PictureFile:
     """A picture as it is in its file.
 
     Raises:
@@ -68,10 +68,10 @@ def read_picture(path: Path) -> Picture:
             f" expected"
             f" {', '.join(DEPTHS)} in up to {MOST_CHANNELS}. Convert it or leave it out."
         )
-    return Picture(pixels, content, _suffix_of(content) or path.suffix.lower())
+    return PictureFile(pixels, content, _suffix_of(content) or path.suffix.lower())
 
 
-def encoded(pixels: ndarray, like: Picture, path: Path) -> bytes:
+def encoded(pixels: ndarray, like: PictureFile, path: Path) -> bytes:
     """The file of a picture of the same kind as another, with all that stood beside its pixels.
 
     Args:

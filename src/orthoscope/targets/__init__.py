@@ -1,0 +1,1 @@
+"""What is photographed, and what was found of it."""

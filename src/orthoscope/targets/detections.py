@@ -21,8 +21,12 @@ __all__ = ["Detections", "Outlier", "SetAside", "View"]
 class View:
     """What was found in one photograph.
 
-    image: the photograph's name. ids: (n,) distinct rows of the target's points. pixels: (n,2) where they
-    were seen. Raises InputError for NaN, infinite or repeated corners.
+    Attributes:
+        image: the photograph's name.
+        ids: (n,) distinct rows of the target's points.
+        pixels: (n,2) where they were seen.
+    Raises:
+        InputError: NaN, infinite or repeated corners.
     """
 
     image: str
@@ -56,7 +60,11 @@ class SetAside(NamedTuple):
 class Outlier(NamedTuple):
     """A corner that was found but takes no part, and why.
 
-    image: the photograph's name.  id: row of the target's points.  pixel: (x, y), where it was seen.
+    Attributes:
+        image: the photograph's name.
+        id: row of the target's points.
+        pixel: (x, y), where it was seen.
+        reason: why it takes no part.
     """
 
     image: str
@@ -69,9 +77,14 @@ class Outlier(NamedTuple):
 class Detections:
     """One target seen by one camera in several photographs.
 
-    image_size: (width, height) pixels.  set_aside: photographs without a view, with the reason.
-    outliers: corners that were found and are in no view, with the reason.
-    Raises InputError for a repeated image name or a corner that the target does not have.
+    Attributes:
+        target: what was photographed.
+        image_size: (width, height) pixels.
+        views: what was found, photograph by photograph.
+        set_aside: photographs without a view, with the reason.
+        outliers: corners that were found and are in no view, with the reason.
+    Raises:
+        InputError: a repeated image name, or a corner that the target does not have.
     """
 
     target: Target

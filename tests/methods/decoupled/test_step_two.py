@@ -13,7 +13,12 @@ from helpers.laws import displaced
 from helpers.scenes import NARROW, WIDE, K, camera_with, photographed, worst_image
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.decoupled.step_one import FORMULA, StepOneFit, fit_step_one
-from orthoscope.methods.decoupled.step_two import by_simplicity, formula_from_pairs, nearest_formula, pairs_of
+from orthoscope.methods.decoupled.step_two import (
+    by_simplicity,
+    formula_from_pairs,
+    nearest_formula,
+    pairs_of_step_one,
+)
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import FREE, LENSES, Brown, Division, KannalaBrandt
@@ -35,7 +40,7 @@ def rays_of(camera: Camera) -> np.ndarray:
 
 
 def test_pairs_are_corners_of_the_real_target_and_the_pixels_where_they_were_seen(exact):
-    rays, pixels = pairs_of(exact)
+    rays, pixels = pairs_of_step_one(exact)
     assert len(rays) == len(pixels) == 10 * 54
     assert_allclose(
         exact.estimate.camera.project(rays), pixels, atol=0.02
@@ -45,7 +50,7 @@ def test_pairs_are_corners_of_the_real_target_and_the_pixels_where_they_were_see
 def test_corners_that_are_missing_make_no_pairs():
     detections = photographed(NARROW, 8, whole=False, fill=(0.9, 0.95))
     fit = fit_step_one(fccm(detections, lens="brown"), target="flat", through=FORMULA)
-    assert len(pairs_of(fit)[0]) == detections.corners < 8 * 54
+    assert len(pairs_of_step_one(fit)[0]) == detections.corners < 8 * 54
 
 
 def test_the_true_formula_is_found_and_its_parameters_are_named(exact):
@@ -65,7 +70,7 @@ def test_only_the_coefficients_that_are_named_are_fitted(exact):
 @pytest.mark.parametrize("lens", ["rational", "division", "fov", "pfet", "kannala_brandt"])
 def test_any_formula_of_the_table_is_fitted_as_well_as_it_can(exact, lens):
     camera, _ = formula_from_pairs(exact, lens)
-    rays, pixels = pairs_of(exact)
+    rays, pixels = pairs_of_step_one(exact)
     assert type(camera.lens) is LENSES[lens]
     assert (
         np.sqrt(((camera.project(rays) - pixels) ** 2).sum(1).mean()) < 1.0

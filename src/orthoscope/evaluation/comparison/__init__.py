@@ -1,0 +1,1 @@
+"""Methods and lenses compared by the views that they were not made from."""

@@ -101,11 +101,18 @@ def compare(
 ) -> Comparison:
     """Judge methods and lenses by the same photographs, which none of them has seen.
 
-    entries: as in `parse_entry`, or its results. folds: of views (docs/conventions.md). executor: where the
-    folds run; the calibrations that are timed run here. progress: called with (calibrations done,
-    calibrations, entry). clock: seconds. An entry that cannot has a standing that says why. Raises InputError
-    for an entry or a setting that is none, CalibrationError where there are too few views to hold any out, or
-    the corners fit no camera.
+    An entry that cannot has a standing that says why.
+
+    Args:
+        detections: of the photographs.
+        entries: as in `parse_entry`, or its results.
+        folds: in how many parts the views are held out.
+        executor: where the folds run; the calibrations that are timed run here.
+        progress: called with (calibrations done, calibrations, entry).
+        clock: seconds.
+    Raises:
+        InputError: an entry or a setting that is none.
+        CalibrationError: too few views to hold any out, or the corners fit no camera.
     """
     chosen = _distinct(entries)
     used = without_outliers(detections)
@@ -132,11 +139,14 @@ def compare(
 def paired_difference(
     squares: Float[ndarray, " m"], others: Float[ndarray, " m"], corners: Float[ndarray, " m"]
 ) -> tuple[float, float]:
-    """How much larger the rms per point of one is than that of the other, pixels, and its standard error,
-    views being independent draws.
+    """How much larger the rms per point of one is than that of the other, pixels, and its standard error.
 
-    squares, others: sums of squared residuals of each view, px^2; corners: of each view. To first order, as
-    in `rms_and_error`.
+    Views are taken as independent draws, to first order, as in `rms_and_error`.
+
+    Args:
+        squares: sum of squared residuals of each view, px^2.
+        others: those of the other.
+        corners: of each view.
     """
     (rms, share), (other_rms, other_share) = (
         _rms_and_shares(squares, corners),
@@ -161,7 +171,8 @@ def _rms_and_shares(
 def _distinct(entries: Sequence[Entry | str]) -> list[Entry]:
     """The entries in their order, each once.
 
-    Raises InputError where there are none.
+    Raises:
+        InputError: there are none.
     """
     parsed = (parse_entry(entry) if isinstance(entry, str) else entry for entry in entries)
     if chosen := list({entry.name: entry for entry in parsed}.values()):

@@ -35,10 +35,12 @@ class Entry(NamedTuple):
 
 
 def parse_entry(text: str) -> Entry:
-    """The entry of a description such as `fccm`, `fccm:brown`, `fccm:brown:k1,k2` or
-    `decoupled:brown:target=flat`.
+    """The entry of a description.
 
-    Raises InputError for a method, a lens or a setting that is not there, and for a value that is none.
+    Args:
+        text: such as `fccm`, `fccm:brown`, `fccm:brown:k1,k2` or `decoupled:brown:target=flat`.
+    Raises:
+        InputError: a method, a lens or a setting that is not there, or a value that is none.
     """
     method, *parts = (part.strip() for part in text.strip().split(":"))
     if method not in METHODS:

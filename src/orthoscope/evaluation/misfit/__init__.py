@@ -1,0 +1,1 @@
+"""Tests of whether residuals agree from view to view, which noise does not."""

@@ -33,9 +33,9 @@ __all__ = [
     "camera_in",
     "load",
     "load_calibration",
-    "load_camera",
     "load_detections",
     "load_evaluation",
+    "load_own_camera",
     "save",
     "text_of",
 ]
@@ -159,7 +159,7 @@ def load_evaluation(path: str | Path, calibration: Calibration | None = None) ->
     return _thing(content, kind, path, [calibration or load_calibration(Path(path).with_name(CALIBRATION))])
 
 
-def load_camera(path: str | Path) -> Camera:
+def load_own_camera(path: str | Path) -> Camera:
     """The camera of a file, also out of a calibration or a scene; errors as `load`."""
     return camera_in(read_bytes(path), path)
 

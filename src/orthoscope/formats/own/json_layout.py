@@ -28,7 +28,9 @@ OTHERWISE = (
 def lay_out(value: Any, indent: str = "") -> str:
     """JSON text of plain values: dict, list, str, numbers, bool, None.
 
-    Raises ValueError for NaN and infinity, TypeError for anything else that JSON has no word for.
+    Raises:
+        ValueError: NaN or infinity.
+        TypeError: anything else that JSON has no word for.
     """
     inner = indent + "  "
     entries = (

@@ -1,0 +1,1 @@
+"""Calibration in two steps: the target's shape and a free lens first, then the camera."""

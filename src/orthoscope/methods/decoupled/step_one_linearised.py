@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.residual_slopes import slopes_of
+from orthoscope.fitting.residual_slopes import residual_slopes
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.decoupled.step_one import StepOneFit
 from orthoscope.solve.losses import Loss
@@ -22,7 +22,7 @@ def linearised(fit: StepOneFit) -> Linearised:
     problem, estimate, loss = fit.problem, fit.estimate, fit.loss
     observations, points = problem.measurements.observations, problem.corners(estimate)
     moves = problem.single or problem.surface.shape[1] > 0
-    slopes, residual = slopes_of(
+    slopes, residual = residual_slopes(
         observations, estimate.camera, estimate.poses, points, problem.free, moves=moves
     )
     surface, singles, spline = problem.precisions

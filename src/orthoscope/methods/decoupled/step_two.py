@@ -19,7 +19,7 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import parse_lens
 from orthoscope.models.parameters import INTRINSICS, Parameters
 
-__all__ = ["by_simplicity", "formula_from_pairs", "nearest_formula", "pairs_of"]
+__all__ = ["by_simplicity", "formula_from_pairs", "nearest_formula", "pairs_of_step_one"]
 
 
 def by_simplicity(formulas: Iterable[str]) -> tuple[str, ...]:
@@ -27,7 +27,7 @@ def by_simplicity(formulas: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(formulas, key=lambda text: (len(parse_lens(text)[1]), text)))
 
 
-def pairs_of(fit: StepOneFit) -> tuple[Float[ndarray, "n 3"], Float[ndarray, "n 2"]]:
+def pairs_of_step_one(fit: StepOneFit) -> tuple[Float[ndarray, "n 3"], Float[ndarray, "n 2"]]:
     """Corrected corners in the camera's frame, metres, and the pixels where they were detected."""
     observations, poses = fit.problem.measurements.observations, fit.estimate.poses
     in_camera = (
@@ -47,7 +47,7 @@ def formula_from_pairs(fit: StepOneFit, lens: str) -> tuple[Camera, tuple[str, .
     """
     kind, coefficients = parse_lens(lens)
     free = (*Parameters.of(fit.problem.free).only(INTRINSICS).names, *coefficients)
-    rays, pixels = pairs_of(fit)
+    rays, pixels = pairs_of_step_one(fit)
     starts = [replace(fit.estimate.camera, lens=kind(**start)) for start in kind.starts]
     camera = fit_pairs(about_principal_point(rays, pixels, free), starts, loss=fit.loss).unknowns
     if not np.isfinite(camera.project(rays)).all():

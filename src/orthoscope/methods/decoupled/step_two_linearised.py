@@ -18,7 +18,7 @@ import numpy as np
 
 from orthoscope.fitting.leave_one_out import LeaveOneOut, scattered
 from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.residual_slopes import slopes_of
+from orthoscope.fitting.residual_slopes import residual_slopes
 from orthoscope.fitting.scatter import Scatter, likenesses, patterns_over_views
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.decoupled.step_one import StepOneFit
@@ -42,7 +42,7 @@ class PairsLeftOut:
     ) -> None:
         self.camera, self.names, self._known, self._fit = camera, tuple(free), known, fit
         observations, points = fit.problem.measurements.observations, fit.problem.corners(fit.estimate)
-        slopes, residual = slopes_of(
+        slopes, residual = residual_slopes(
             observations, camera, fit.estimate.poses, points, free, moves=bool(known.slopes.corner.shape[1])
         )
         root = roots_of(fit.loss, residual, observations.present)

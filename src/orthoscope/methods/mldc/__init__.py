@@ -1,0 +1,1 @@
+"""The paper's method (MLDC) and its descendant (NMLDC)."""

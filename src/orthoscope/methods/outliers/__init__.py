@@ -1,0 +1,1 @@
+"""Corners and views that do not belong, found and left out."""

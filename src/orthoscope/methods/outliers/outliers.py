@@ -1,15 +1,14 @@
-"""Corners and whole views that do not belong: found, named with the reason, and left out before a calibration
-starts.
+"""Corners and whole views that do not belong: found, named with the reason, left out before a calibration.
 
 Three steps, each more exact than the one before and started by it.
 
 1. *Order*. In each view a robust polynomial over the target says where each corner should be, whatever the
-   lens (view_polynomial.py). A view whose typical corner misses that by more than DISORDER of a square is in
-   no order of the target and is set aside. Corners that miss by more than FAR_OFF take no part in the next
-   step's start; nothing is decided about them yet, since a strong lens is no polynomial.
-2. *Camera*. FCCM of the others with a Cauchy loss, then on with all corners, the loss's scale being OUTLYING
-   times the noise that the views tell. The scale is wide on purpose: a narrow one gives up the border of the
-   image where the lens formula fits badly, and the corners there would then look wrong.
+   lens (view_polynomial.py). A view whose typical corner misses that by more than DISORDER_SHARE of a square
+   is in no order of the target and is set aside. Corners that miss by more than FAR_OFF_RATIO take no part in
+   the next step's start; nothing is decided about them yet, since a strong lens is no polynomial.
+2. *Camera*. FCCM of the others with a Cauchy loss, then on with all corners, the loss's scale being
+   OUTLYING_RATIO times the noise that the views tell. The scale is wide on purpose: a narrow one gives up the
+   border of the image where the lens formula fits badly, and the corners there would then look wrong.
 3. *Residuals* (residual_tests.py). What is off by far more than the noise, and for no reason that repeats, is
    left out; 2 and 3 are done again until nothing changes.
 
@@ -30,7 +29,14 @@ from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, Int, ndarray
 from orthoscope.methods.fccm import fit_flat
-from orthoscope.methods.outliers.residual_tests import LEAST, OUTLYING, Believed, judged, noise_of, sizes_of
+from orthoscope.methods.outliers.residual_tests import (
+    LEAST_HARM,
+    OUTLYING_RATIO,
+    Believed,
+    noise_of,
+    residual_tests,
+    sizes_of,
+)
 from orthoscope.methods.outliers.view_polynomial import trends
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Cauchy
@@ -38,22 +44,31 @@ from orthoscope.targets.detections import Detections, Outlier, SetAside, View
 
 __all__ = ["without_outliers"]
 
-# of a square: a right board seen through a fisheye misses the polynomial by 0.3 at most, one in another order
-# by 0.5 to 20
-DISORDER = 0.4
-# times the typical view's share of a square: where all are as bad, none is in disorder, short of a whole
-# square
-UNLIKE = 3.0
-FAR_OFF = 4.0  # times the view's typical miss, and half a square
-DOUBTFUL = 0.25  # of a view's corners far off: where no camera fits, such views are given up first
-START_SCALE = 0.002  # of the image's longer side: where the loss of the start begins to matter
-ROUNDS = 4
-ROUGHLY = Options(max_steps=20, tolerance=1e-4)
+# A view whose typical corner misses the polynomial by more than this share of a square is in disorder: a
+# right board seen through a fisheye misses it by 0.3 at most, one in another order by 0.5 to 20.
+DISORDER_SHARE = 0.4
+# It also has to miss by this many times what the typical view does, or by a whole square: where all are as
+# bad, none is in disorder.
+DISORDER_RATIO = 3.0
+# A corner is far off that misses by this many times what its view typically does, and by half a square.
+FAR_OFF_RATIO = 4.0
+# Where no camera fits, views with more than this share of their corners far off are given up first.
+DOUBTFUL_SHARE = 0.25
+# The loss of the start forgives from this share of the image's longer side on.
+START_LOSS_SHARE = 0.002
+# Steps 2 and 3 are done at most this often.
+REFINING_ROUNDS = 4
+# A refined camera need not be exact, since the next round moves it again.
+ROUGH_OPTIONS = Options(max_steps=20, tolerance=1e-4)
 
 
 class _Order(NamedTuple):
-    """near (m,n): corners near where the others of their view put them. typical (m,): the view's median miss,
-    pixels. disorder (m,).
+    """Step 1: what the order of the corners says, a row each view.
+
+    Attributes:
+        near: corners near where the others of their view put them, (m,n).
+        typical: the view's median miss, (m,) pixels.
+        disorder: whether the view is in no order of the target, (m,).
     """
 
     near: Bool[ndarray, "m n"]
@@ -62,11 +77,13 @@ class _Order(NamedTuple):
 
 
 def without_outliers(detections: Detections, *, lens: str = "auto") -> Detections:
-    """The detections with corners that do not belong moved to `outliers` and views that do not to
-    `set_aside`, each with the reason.
+    """The detections with corners that do not belong in `outliers`, views that do not in `set_aside`.
 
-    lens: as in `fccm`. Raises CalibrationError where no view is left, or the corners fit no camera with this
-    lens.
+    Args:
+        detections: what was found.
+        lens: of the cameras that decide, as in `fccm`.
+    Raises:
+        CalibrationError: no view is left, or the corners fit no camera with this lens.
     """
     used = with_usable_views(detections)
     points = used.target.points
@@ -85,13 +102,15 @@ def without_outliers(detections: Detections, *, lens: str = "auto") -> Detection
 
 
 def _order(observations: Observations, points: Float[ndarray, "p 3"]) -> _Order:
-    """Step 1."""
+    """Step 1: which corners are near and which views are in disorder."""
     present = observations.present
     trend = trends(points[observations.ids, :2], observations.pixels(), present, order=3)
     square = _squares(trend.values, present)
     share = trend.typical / square
-    near = (present > 0) & (trend.misses <= np.maximum(FAR_OFF * trend.typical, 0.5 * square)[:, None])
-    return _Order(near, trend.typical, share > min(max(DISORDER, UNLIKE * float(np.median(share))), 1.0))
+    near = (present > 0) & (trend.misses <= np.maximum(FAR_OFF_RATIO * trend.typical, 0.5 * square)[:, None])
+    return _Order(
+        near, trend.typical, share > min(max(DISORDER_SHARE, DISORDER_RATIO * float(np.median(share))), 1.0)
+    )
 
 
 def _squares(places: Float[ndarray, "m n 2"], present: Float[ndarray, "m n"]) -> Float[ndarray, " m"]:
@@ -117,7 +136,7 @@ def _started(
         calibration = _from_near(used, observations, order.near, rows, lens=lens)
     except CalibrationError:
         far = 1.0 - order.near.sum(1) / observations.counts
-        doubtful = rows[far[rows] > DOUBTFUL]
+        doubtful = rows[far[rows] > DOUBTFUL_SHARE]
         if len(doubtful) in (0, len(rows)):
             raise
         given_up = {
@@ -158,9 +177,9 @@ def _from_near(
     *,
     lens: str,
 ) -> Calibration:
-    """FCCM of these rows' near corners, robustly."""
+    """FCCM of these rows' near corners, with a Cauchy loss."""
     chosen = replace(used, views=_views(used, observations.order[rows], near[rows]), set_aside=())
-    return fit_flat(chosen, lens=lens, loss="cauchy", loss_scale=START_SCALE * max(used.image_size))
+    return fit_flat(chosen, lens=lens, loss="cauchy", loss_scale=START_LOSS_SHARE * max(used.image_size))
 
 
 def _settled(believed: Believed, points: Float[ndarray, "p 3"]) -> tuple[Believed, dict[int, str]]:
@@ -168,14 +187,14 @@ def _settled(believed: Believed, points: Float[ndarray, "p 3"]) -> tuple[Believe
     noise = noise_of(sizes_of(believed, points), believed.corners)
     believed = _refined(believed._replace(corners=believed.present), points, noise=noise)
     aside: dict[int, str] = {}
-    for _ in range(ROUNDS):
-        judgement = judged(believed, points)
-        corners = believed.present & ~judgement.off
-        if not judgement.strange and (corners == believed.corners).all():
+    for _ in range(REFINING_ROUNDS):
+        tests = residual_tests(believed, points)
+        corners = believed.present & ~tests.off
+        if not tests.strange and (corners == believed.corners).all():
             break
-        aside |= {int(believed.observations.order[row]): reason for row, reason in judgement.strange.items()}
-        rows = np.setdiff1d(np.arange(len(corners)), list(judgement.strange))
-        believed = _refined(believed._replace(corners=corners).only(rows), points, noise=judgement.noise)
+        aside |= {int(believed.observations.order[row]): reason for row, reason in tests.strange.items()}
+        rows = np.setdiff1d(np.arange(len(corners)), list(tests.strange))
+        believed = _refined(believed._replace(corners=corners).only(rows), points, noise=tests.noise)
     return believed, aside
 
 
@@ -183,7 +202,12 @@ def _refined(believed: Believed, points: Float[ndarray, "p 3"], *, noise: float)
     """Camera and poses again, from the corners that are believed."""
     observations = replace(believed.observations, present=believed.corners.astype(float))
     problem = Reprojection(observations, points, believed.estimate.camera, believed.free)
-    solution = solve(problem, believed.estimate, loss=Cauchy(max(OUTLYING * noise, LEAST)), options=ROUGHLY)
+    solution = solve(
+        problem,
+        believed.estimate,
+        loss=Cauchy(max(OUTLYING_RATIO * noise, LEAST_HARM)),
+        options=ROUGH_OPTIONS,
+    )
     return believed._replace(estimate=solution.unknowns)
 
 

@@ -1,0 +1,1 @@
+"""What the page shows, as numbers that its script draws."""

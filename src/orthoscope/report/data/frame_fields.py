@@ -19,7 +19,7 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
 from orthoscope.report.data.rounded import RESIDUAL, whole
 
-__all__ = ["difference", "displacement", "ideal_image", "lens_misfit"]
+__all__ = ["difference", "displacement", "ideal_image", "lens_misfit_data"]
 
 CELLS = 1200  # of the frame, about
 
@@ -47,7 +47,7 @@ def difference(evaluation: Evaluation) -> dict[str, Any] | str:
     )
 
 
-def lens_misfit(evaluation: Evaluation) -> dict[str, Any] | str:
+def lens_misfit_data(evaluation: Evaluation) -> dict[str, Any] | str:
     """What the views agree on at each place of the image."""
     misfit = evaluation.misfit.lens
     if np.isnan(misfit.test.f):

@@ -11,10 +11,10 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.report.data.rounded import digits
 from orthoscope.report.shape import corners_seen
 
-__all__ = ["target_misfit", "target_shape"]
+__all__ = ["target_misfit_data", "target_shape_data"]
 
 
-def target_shape(evaluation: Evaluation) -> dict[str, Any] | str:
+def target_shape_data(evaluation: Evaluation) -> dict[str, Any] | str:
     """The shape that was estimated for the target."""
     calibration = evaluation.calibration
     shape = calibration.target_shape
@@ -24,7 +24,7 @@ def target_shape(evaluation: Evaluation) -> dict[str, Any] | str:
     return _moved(calibration.detections.target.points, np.where(seen[:, None], shape.displacements, np.nan))
 
 
-def target_misfit(evaluation: Evaluation) -> dict[str, Any] | str:
+def target_misfit_data(evaluation: Evaluation) -> dict[str, Any] | str:
     """Where the corners seem to be against where they are taken to be, as far as views agree on it."""
     misfit = evaluation.misfit.target
     if np.isnan(misfit.test.f):
