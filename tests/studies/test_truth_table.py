@@ -38,7 +38,7 @@ def test_the_fisheye_is_opencvs_in_front_of_the_camera():
 
 def test_a_window_that_touches_the_lens_bends_rays_by_snells_law():
     camera = Projector(port=1e-12, coefficients=(0.0, 0.0, 0.0, 0.0))
-    ahead = points() + [0.0, 0.0, 1.2]  # nothing is seen beyond 48 degrees
+    ahead = points() + np.array([0.0, 0.0, 1.2])  # nothing is seen beyond 48 degrees
     seen = (camera.pixels(ahead) - camera.centre) / camera.focal
     in_water = np.arctan(np.hypot(*ahead[:, :2].T) / ahead[:, 2])
     assert_allclose(np.sin(np.arctan(np.hypot(*seen.T))), 1.333 * np.sin(in_water), rtol=1e-6)
