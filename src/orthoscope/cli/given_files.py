@@ -1,7 +1,7 @@
 """The files that a verb was given to read, so that none of them is written onto.
 
-A file is known by what it is, not by its name: links and other spellings of a path are the same file. Of a
-folder only photographs and films count, since what an earlier run wrote there may be written anew.
+A file is known by what it is, not by its name: links and other spellings of a path are the same file. Of a folder
+only photographs and films count, since what an earlier run wrote there may be written anew.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ Example:
   wrote      report.html
 
 \b
-CALIBRATION.json is what `calibrate` wrote, or its folder; the evaluation.json beside it is read, and made
-anew only where it is missing, of another calibration, or --folds is asked for.
+CALIBRATION.json is what `calibrate` wrote, or its folder; the evaluation.json beside it is read, and made anew only
+where it is missing, of another calibration, or --folds is asked for.
 """
 
 
