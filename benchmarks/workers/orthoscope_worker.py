@@ -20,9 +20,9 @@ SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {  # what is called for each n
     "brown": ("fccm", {"lens": "brown"}),
     "rational": ("fccm", {"lens": "rational"}),
     "kannala_brandt": ("fccm", {"lens": "kannala_brandt"}),
-    "free target": ("decoupled", {"target": "free", "lens": "brown", "through": "formula"}),
-    "free lens": ("decoupled", {"target": "flat", "lens": "free"}),
-    "free target and lens": ("decoupled", {"target": "free", "lens": "free"}),
+    "free target": ("decoupled", {"shape": "free", "lens": "brown", "first_lens": "formula"}),
+    "free lens": ("decoupled", {"shape": "flat", "lens": "free"}),
+    "free target and lens": ("decoupled", {"shape": "free", "lens": "free"}),
     "chosen by itself": ("decoupled", {}),
 }
 

@@ -44,7 +44,7 @@ def test_the_shape_that_is_asked_for_is_the_one_that_is_estimated(calibrate, sha
     told, out = calibrate("--shape", shape, "--lens", "free")
     assert told.code == 0, told.err
     made = load_calibration(out / "calibration.json")
-    assert made.settings["target"] == made.target_shape.kind == shape
+    assert made.settings["shape"] == made.target_shape.kind == shape
     assert isinstance(made.camera.lens, FreeLens)
     assert made.target_shape.displacements.any() == (shape != "flat")
 

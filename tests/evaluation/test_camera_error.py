@@ -30,8 +30,8 @@ def moved(camera: Camera, step: np.ndarray) -> Camera:
     return Parameters.of(NAMES).moved(camera, step)
 
 
-def scattered(detections: Detections, target: str = "flat", through: str = "formula") -> Scatter:
-    known = linearised(fit_step_one(fit_flat(detections, lens="brown"), target=target, through=through))
+def scattered(detections: Detections, target: str = "flat", first_lens: str = "formula") -> Scatter:
+    known = linearised(fit_step_one(fit_flat(detections, lens="brown"), target=target, first_lens=first_lens))
     return scatter_of(known, leave_one_out(known), detections.target.points)
 
 
@@ -121,7 +121,7 @@ def test_a_bent_board_taken_for_flat_is_off_by_more_than_it_knows_and_the_riches
 
 
 def test_errors_alike_within_views_are_seen(noisy: Detections):
-    independent = linearised(fit_step_one(fit_flat(noisy, lens="brown"), target="flat", through="formula"))
+    independent = linearised(fit_step_one(fit_flat(noisy, lens="brown"), shape="flat", first_lens="formula"))
     tau = likenesses(independent, patterns_over_views(independent, noisy.target.points))
     assert max(tau) < 1.6  # by chance: 20 to 32 patterns in each of twelve views
     rng, points = np.random.default_rng(0), noisy.target.points
@@ -133,7 +133,7 @@ def test_errors_alike_within_views_are_seen(noisy: Detections):
     ]
     alike = linearised(
         fit_step_one(
-            fit_flat(replace(noisy, views=tuple(views)), lens="brown"), target="flat", through="formula"
+            fit_flat(replace(noisy, views=tuple(views)), lens="brown"), shape="flat", first_lens="formula"
         )
     )
     tau = likenesses(alike, patterns_over_views(alike, points))

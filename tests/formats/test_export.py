@@ -288,7 +288,7 @@ def test_with_the_calibration_the_nearest_is_the_one_where_corners_were_seen():
     seen = simulate_detections(
         Scene(FREE, board, random_views(FREE, board, 8, rng=rng, fill=(0.3, 0.4))), noise_px=0.1, rng=rng
     )
-    calibration = decoupled(seen, lens="free", target="flat")
+    calibration = decoupled(seen, lens="free", shape="flat")
     near, everywhere = (
         exportable(calibration.camera, "opencv", made_from=calibration),
         exportable(calibration.camera, "opencv"),

@@ -76,9 +76,9 @@ def a_decoupled_calibration() -> Calibration:
         method="decoupled",
         settings={
             "lens": "free",
-            "target": "free",
+            "shape": "free",
             "base": "brown",
-            "through": "free",
+            "first_lens": "free",
             "fit": "joint",
             "skew": False,
         },
@@ -196,7 +196,7 @@ def test_what_no_view_could_judge_is_null_in_the_file(tmp_path):
     )
     assert content["candidates"][1:] == [
         {
-            "target": "smooth",
+            "shape": "smooth",
             "lens": "brown",
             "base": "brown",
             "fit": "joint",
@@ -206,7 +206,7 @@ def test_what_no_view_could_judge_is_null_in_the_file(tmp_path):
             "loses_px": 1 / 7,
         },
         {
-            "target": "free",
+            "shape": "free",
             "lens": "rational",
             "base": "brown",
             "fit": "pairs",

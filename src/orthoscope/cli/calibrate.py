@@ -122,15 +122,15 @@ def calibrate_into(
 
     check_folder(out)
     lenses = _lenses_of(export)
-    among = lenses if "among" in settings_of(method) else ()
+    formulas = lenses if "formulas" in settings_of(method) else ()
     given = {
         "lens": lens,
         "skew": skew,
-        "target": shape,
+        "shape": shape,
         "base": base,
         "fit": fit,
         "loss": loss,
-        "among": among or None,
+        "formulas": formulas or None,
     }
     given = {name: value for name, value in given.items() if value is not None} | settings_from(more)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:

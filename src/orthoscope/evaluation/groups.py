@@ -225,7 +225,7 @@ def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndar
 
 
 def _fit(detections: Detections, *, base: str) -> StepOneFit:
-    return fit_step_one(fit_flat(detections, lens=base), target="free", through=FREE)
+    return fit_step_one(fit_flat(detections, lens=base), shape="free", first_lens=FREE)
 
 
 def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:

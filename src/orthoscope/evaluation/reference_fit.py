@@ -99,7 +99,7 @@ def _own(
         without = candidates.contender(model).squares
         return candidates.scatter(model), without, within
     if calibration.method == "fccm":
-        mine = linearised(fit_step_one(calibration, target="flat", through=FORMULA))
+        mine = linearised(fit_step_one(calibration, shape="flat", first_lens=FORMULA))
         left_out = leave_one_out(mine)
         return scatter_of(mine, left_out, calibration.detections.target.points), left_out.squares, within
     return None, candidates.left_out(richest).squares, within
@@ -109,7 +109,7 @@ def _model(calibration: Calibration) -> Model:
     """What a calibration of the default method was made as."""
     settings = calibration.settings
     formula = settings["lens"] if settings["fit"] == PAIRS else None
-    return Model(settings["base"], settings["target"], settings["through"], formula)
+    return Model(settings["base"], settings["shape"], settings["first_lens"], formula)
 
 
 def _is(calibration: Calibration, richest: Model) -> bool:

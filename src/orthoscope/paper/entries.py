@@ -38,7 +38,7 @@ __all__ = [
 TOLD: dict[
     str, Mapping[str, Any]
 ] = {  # what a method need not find out: the simulated board is flat, and all tests are on flat boards
-    "decoupled": {"target": "flat", "through": "free"},
+    "decoupled": {"shape": "flat", "first_lens": "free"},
 }
 FCCM, NMLDC, MLDC = "FCCM", "NMLDC, plain", "MLDC, eq. (7)"
 REPEATED, NEAREST, REPAIRED = "MLDC, repeated", "MLDC, nearest", "NMLDC, repaired"

@@ -44,13 +44,13 @@ def comparison() -> Comparison:
         ("decoupled", "decoupled", {}),
         ("fccm:brown", "fccm", {"lens": "brown"}),
         (" fccm:brown:k1,k2 ", "fccm", {"lens": "brown:k1,k2"}),
-        ("decoupled:target=flat", "decoupled", {"target": "flat"}),
+        ("decoupled:shape=flat", "decoupled", {"shape": "flat"}),
         (
-            "decoupled:brown:k1:target=free:folds=4:skew=true",
+            "decoupled:brown:k1:shape=free:base=brown:skew=true",
             "decoupled",
-            {"lens": "brown:k1", "target": "free", "folds": 4, "skew": True},
+            {"lens": "brown:k1", "shape": "free", "base": "brown", "skew": True},
         ),
-        ("decoupled:among=brown,rational", "decoupled", {"among": ("brown", "rational")}),
+        ("decoupled:formulas=brown,rational", "decoupled", {"formulas": ("brown", "rational")}),
         ("fccm:loss=huber:loss_scale=2", "fccm", {"loss": "huber", "loss_scale": 2.0}),
         ("mldc:weights=1,0.5,2", "mldc", {"weights": (1.0, 0.5, 2.0)}),
     ],
@@ -68,7 +68,7 @@ def test_an_entrant_is_a_method_its_lens_and_its_settings(text, method, settings
         ("", ("''", "fccm:brown")),
         ("fccm:fisheye", ("'fisheye'", "kannala_brandt")),
         ("fccm:brown:k9", ("'k9'", "k1, k2")),
-        ("fccm:target=flat", ("'target'", "loss_scale")),
+        ("fccm:shape=flat", ("'target'", "loss_scale")),
         ("fccm:skew=perhaps", ("'perhaps'", "skew=false")),
         ("fccm:max_steps=many", ("'many'", "a whole number", "max_steps=200")),
         ("fccm:loss_scale=wide", ("'wide'", "a number")),
@@ -310,9 +310,9 @@ def test_one_alone_is_not_called_the_best():
 
 @pytest.mark.slow
 def test_a_bent_board_is_foreseen_best_by_the_method_that_finds_its_shape():
-    found = compare(photographs_of(bent(3.0), 12, seed=0), ["fccm:brown", "decoupled:through=formula"])
+    found = compare(photographs_of(bent(3.0), 12, seed=0), ["fccm:brown", "decoupled:first_lens=formula"])
     assert [standing.entry.name for standing in found.standings] == [
-        "decoupled:through=formula",
+        "decoupled:first_lens=formula",
         "fccm:brown",
     ]
     assert found.standings[1].loses_px > 2.0 * found.standings[1].loses_error_px
@@ -324,7 +324,7 @@ def test_a_bent_board_is_foreseen_best_by_the_method_that_finds_its_shape():
 def test_on_real_photographs_the_shape_of_the_board_is_worth_more_than_any_formula(datasets: Path):
     found = compare(
         classic(datasets, "opencv-left"),
-        ["decoupled:through=formula:target=free", "fccm:brown", "fccm:rational"],
+        ["decoupled:first_lens=formula:shape=free", "fccm:brown", "fccm:rational"],
     )
     best, *others = found.standings
     assert best.entry.method == "decoupled"

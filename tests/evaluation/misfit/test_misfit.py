@@ -348,7 +348,7 @@ def test_it_falls_silent_once_the_shape_of_the_target_is_estimated(datasets: Pat
     views = len(detections.views)
     flat, shaped = (
         fccm(detections, lens="brown"),
-        decoupled(detections, lens="brown", target="free", through="formula"),
+        decoupled(detections, lens="brown", shape="free", first_lens="formula"),
     )
     assert is_misfit(misfit(flat).target.test, views)
     assert (

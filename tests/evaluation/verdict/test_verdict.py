@@ -52,13 +52,13 @@ FAULTS = {  # what can be wrong, each as the facts that say so
 }
 
 MADE_BY = {
-    "default": {"method": "decoupled", "lens": "free", "shape": "free", "through": "free"},
-    "default, flat": {"method": "decoupled", "lens": "brown", "shape": "flat", "through": "formula"},
+    "default": {"method": "decoupled", "lens": "free", "shape": "free", "first_lens": "free"},
+    "default, flat": {"method": "decoupled", "lens": "brown", "shape": "flat", "first_lens": "formula"},
     "default, smooth, for a tool": {
         "method": "decoupled",
         "lens": "rational",
         "shape": "smooth",
-        "through": "free",
+        "first_lens": "free",
     },
     "fccm": {"method": "fccm", "lens": "brown:k1,k2", "shape": "flat", "loss": "linear"},
     "mldc": {"method": "mldc", "lens": "pfet", "shape": "flat"},

@@ -70,7 +70,7 @@ def settled(displacements: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES.keys())
 def test_without_noise_camera_and_target_are_exact(camera: Camera, shape: np.ndarray):
     detections = photographed_with(shape, camera, 10)
-    found = decoupled(detections, target="free", through="formula")
+    found = decoupled(detections, shape="free", first_lens="formula")
     assert found.rms_px < 1e-9
     # without noise the weights are so loose that priors cost 1e-8 px at most
     assert worst_image(camera, found.camera, detections) < 1e-6
@@ -81,7 +81,7 @@ def test_without_noise_camera_and_target_are_exact(camera: Camera, shape: np.nda
 def test_with_noise_camera_and_target_are_found_as_well_as_the_noise_lets_them(
     found: Calibration, noisy: Detections
 ):
-    assert found.settings["target"] == "free"
+    assert found.settings["shape"] == "free"
     seen = np.concatenate([view.pixels for view in noisy.views])
     perfect = fccm(
         photographed_with(0.0 * BOTH, NARROW, 10, noise_px=NOISE)
@@ -103,7 +103,7 @@ def test_candidates_are_told_with_what_each_loses_against_the_one_that_was_taken
     assert tried == set(product(KINDS, ("brown", "free")))
     assert all(candidate.views == len(found.detections.views) for candidate in found.candidates)
     taken = next(candidate for candidate in found.candidates if candidate.loses_px == 0.0)
-    assert (taken.target, taken.lens) == (found.settings["target"], found.settings["lens"])
+    assert (taken.target, taken.lens) == (found.settings["shape"], found.settings["lens"])
     for candidate in found.candidates:
         assert candidate.loses_px == pytest.approx(candidate.held_out_px - taken.held_out_px)
     flat = next(candidate for candidate in found.candidates if candidate[:2] == ("flat", "brown"))
@@ -150,9 +150,9 @@ def test_its_settings_are_plain_and_called_again_give_the_same_to_the_last_bit(
     assert found.method == "decoupled"
     assert found.settings == {
         "lens": "brown",
-        "target": "free",
+        "shape": "free",
         "base": "brown",
-        "through": "formula",
+        "first_lens": "formula",
         "fit": "joint",
         "skew": False,
     }
@@ -164,9 +164,9 @@ def test_its_settings_are_plain_and_called_again_give_the_same_to_the_last_bit(
 @pytest.mark.parametrize(
     "settings",
     [
-        {"lens": "division", "target": "smooth", "through": "free"},
-        {"lens": "brown:k1,k2", "target": "flat", "through": "formula", "skew": True},
-        {"target": "free", "through": "formula", "base": "kannala_brandt"},
+        {"lens": "division", "shape": "smooth", "first_lens": "free"},
+        {"lens": "brown:k1,k2", "shape": "flat", "first_lens": "formula", "skew": True},
+        {"shape": "free", "first_lens": "formula", "base": "kannala_brandt"},
     ],
 )
 def test_whatever_is_settled_beforehand_is_kept_and_gives_the_same_again(noisy: Detections, settings: dict):
@@ -183,7 +183,7 @@ def test_the_same_photographs_give_the_same_choice_to_the_last_bit(noisy: Detect
 
 
 def test_a_formula_that_is_asked_for_comes_with_the_free_camera_that_it_was_fitted_to(noisy: Detections):
-    fitted = decoupled(noisy, lens="brown", target="free", through="free")
+    fitted = decoupled(noisy, lens="brown", shape="free", first_lens="free")
     assert isinstance(fitted.camera.lens, Brown)
     assert fitted.free_camera is not None
     assert isinstance(fitted.free_camera.lens, FreeLens)
@@ -191,12 +191,14 @@ def test_a_formula_that_is_asked_for_comes_with_the_free_camera_that_it_was_fitt
     assert (
         np.median(image_difference(fitted.free_camera, fitted.camera, seen)) < NOISE
     )  # the lens is a brown one
-    assert decoupled(noisy, lens="brown", target="free", through="formula").free_camera is None
+    assert decoupled(noisy, lens="brown", shape="free", first_lens="formula").free_camera is None
 
 
 @pytest.mark.slow
 def test_out_of_several_formulas_the_one_that_foresees_best_is_taken(noisy: Detections):
-    chosen = decoupled(noisy, target="free", through="formula", among=("rational", "division:l", "brown"))
+    chosen = decoupled(
+        noisy, shape="free", first_lens="formula", formulas=("rational", "division:l", "brown")
+    )
     assert chosen.settings["lens"] == "brown"  # simpler ones do not suffice, richer ones gain nothing
     assert {(candidate.lens, candidate.fit) for candidate in chosen.candidates[-5:]} == {
         ("division:l", "pairs"),
@@ -205,7 +207,7 @@ def test_out_of_several_formulas_the_one_that_foresees_best_is_taken(noisy: Dete
         ("rational", "pairs"),
         ("rational", "joint"),
     }
-    only = decoupled(noisy, target="free", through="formula", among=("division",))
+    only = decoupled(noisy, shape="free", first_lens="formula", formulas=("division",))
     assert isinstance(only.camera.lens, Division)
 
 
@@ -214,7 +216,7 @@ def test_progress_counts_to_the_end(noisy: Detections):
     decoupled(
         noisy,
         lens="brown",
-        through="formula",
+        first_lens="formula",
         judging=lambda done, to_do: heard.append((done, to_do)),
     )
     assert [done for done, _ in heard] == sorted(done for done, _ in heard)
@@ -224,15 +226,15 @@ def test_progress_counts_to_the_end(noisy: Detections):
 
 def test_a_skew_is_found_where_it_is_asked_for():
     camera = Camera(NARROW.image_size, replace(K, skew=5.0), NARROW.lens)
-    found = decoupled(photographed_with(BOTH, camera, 10), target="free", through="free", skew=True)
+    found = decoupled(photographed_with(BOTH, camera, 10), shape="free", first_lens="free", skew=True)
     assert found.camera.intrinsics.skew == pytest.approx(5.0, abs=0.1)  # the free lens shares in it a little
     assert "skew" in found.uncertainty.names
 
 
 def test_partial_boards_are_as_welcome_as_whole_ones():
     detections = some_corners(photographed_with(bowed(2e-3), NARROW, 10, noise_px=NOISE), (0.5, 0.9))
-    found = decoupled(detections, through="formula")
-    assert found.settings["target"] in ("smooth", "free")
+    found = decoupled(detections, first_lens="formula")
+    assert found.settings["shape"] in ("smooth", "free")
     assert worst_image(NARROW, found.camera, detections) < 0.1 * worst_image(
         NARROW, fccm(detections).camera, detections
     )
@@ -241,7 +243,7 @@ def test_partial_boards_are_as_welcome_as_whole_ones():
 def test_a_corner_that_no_view_has_is_left_where_the_target_says():
     whole = photographed_with(BOTH, NARROW, 8, noise_px=NOISE)
     views = tuple(replace(view, ids=view.ids[2:], pixels=view.pixels[2:]) for view in whole.views)
-    found = decoupled(replace(whole, views=views), target="free", through="formula")
+    found = decoupled(replace(whole, views=views), shape="free", first_lens="formula")
     assert_array_equal(found.target_shape.displacements[:2], 0.0)
     assert found.target_shape.displacements[2:].all()
 
@@ -251,8 +253,8 @@ def test_a_board_of_few_corners_is_calibrated_too():
     detections = photographed_with(
         stretched(0.01, target), NARROW, 12, target=target, noise_px=NOISE, fill=(0.5, 0.9)
     )
-    found = decoupled(detections, through="formula")
-    assert found.settings["target"] != "flat"
+    found = decoupled(detections, first_lens="formula")
+    assert found.settings["shape"] != "flat"
     assert found.rms_px < 2.0 * NOISE
 
 
@@ -262,9 +264,9 @@ def test_with_few_views_the_target_is_taken_as_flat_and_that_is_said(views: int)
     found, flat = decoupled(detections), fccm(detections)
     assert found.settings == {
         "lens": "brown",
-        "target": "flat",
+        "shape": "flat",
         "base": "brown",
-        "through": "formula",
+        "first_lens": "formula",
         "fit": "joint",
         "skew": False,
     }
@@ -300,16 +302,16 @@ def test_views_that_cannot_tell_the_camera_are_refused_as_by_fccm():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"target": "wavy"}, "target shape 'wavy' is not known; expected one of auto, flat, smooth, free"),
+        ({"shape": "wavy"}, "target shape 'wavy' is not known; expected one of auto, flat, smooth, free"),
         ({"lens": "soap"}, "lens 'soap' is not known"),
         ({"lens": "brown:k9"}, "has no coefficient 'k9'"),
         ({"base": "soap"}, "lens 'soap' is not known"),
         ({"base": "free"}, "lens 'free' is not known"),
-        ({"through": "windows"}, "through is 'windows'; expected 'free'"),
-        ({"lens": "free", "through": "formula"}, "expected one of the two"),
-        ({"among": ("brown", "soap")}, "lens 'soap' is not known"),
+        ({"first_lens": "windows"}, "first_lens is 'windows'; expected 'free'"),
+        ({"lens": "free", "first_lens": "formula"}, "expected one of the two"),
+        ({"formulas": ("brown", "soap")}, "lens 'soap' is not known"),
         ({"fit": "by eye"}, "fit is 'by eye'; expected 'joint'"),
-        ({"lens": "brown", "fit": "joint", "through": "free"}, "cannot be fitted joint through free"),
+        ({"lens": "brown", "fit": "joint", "first_lens": "free"}, "cannot be fitted joint through free"),
     ],
 )
 def test_a_setting_that_is_none_is_refused(noisy: Detections, settings: dict, message: str):
@@ -334,10 +336,10 @@ def test_in_the_papers_simulation_the_free_lens_makes_up_for_what_its_base_lacks
         simulate_detections(scene, noise_px=0.0, rng=rng),
     )
     train, test = train.only(range(15)), test.only(range(15, 25))
-    poor = nce_on(decoupled(train, base="brown:k1,k2", lens="free", target="flat"), test)
+    poor = nce_on(decoupled(train, base="brown:k1,k2", lens="free", shape="flat"), test)
     assert poor <= 0.05  # measured: 0.028
     assert poor < 0.1 * nce_on(fccm(train, lens="brown:k1,k2"), test)
-    assert nce_on(decoupled(train, base="brown", lens="free", target="flat"), test) <= 1.05 * nce_on(
+    assert nce_on(decoupled(train, base="brown", lens="free", shape="flat"), test) <= 1.05 * nce_on(
         fccm(train, lens="brown"), test
     )  # 0.016 and 0.027
 

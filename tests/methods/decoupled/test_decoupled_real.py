@@ -68,7 +68,7 @@ def test_on_the_published_test_views_of_babel_cube_it_stays_below_the_best_publi
 
 @pytest.mark.slow
 def test_on_calibrel_it_chooses_the_shape_of_the_target_by_itself(calibrel: Calibration):
-    assert calibrel.settings["target"] == "free"
+    assert calibrel.settings["shape"] == "free"
     flat, smooth, free = (candidate.held_out_px for candidate in calibrel.candidates[:3])
     assert flat > 2.5 * free  # 0.37 against 0.11 px
     assert smooth > 2.0 * free  # 0.30
@@ -87,7 +87,7 @@ def test_on_calibrel_a_flat_target_moves_the_principal_point_by_seventy_pixels(c
 def test_on_calibrel_both_halves_of_the_photographs_find_the_same_shape(calibrel: Calibration):
     detections = calibrel.detections
     halves = [
-        decoupled(detections.only(range(start, len(detections.views), 2)), target="free", through="formula")
+        decoupled(detections.only(range(start, len(detections.views), 2)), shape="free", first_lens="formula")
         for start in (0, 1)
     ]
     one, other = (half.target_shape.displacements for half in halves)

@@ -27,18 +27,18 @@ CORNER = 15e-6  # metres: noise in the mean of 15 views, where a board of 0.2 m 
 SOME = Evidence(0.01, (1e-6, 4e-6), (1e-8, 4e-8, 1e-6), 1e-8, SIZE, parameters=40.0)
 
 
-def fitted(detections: Detections, *, target: str = "free", through: str = FORMULA) -> StepOneFit:
-    return fit_step_one(fccm(detections, lens="brown"), target=target, through=through)
+def fitted(detections: Detections, *, target: str = "free", first_lens: str = FORMULA) -> StepOneFit:
+    return fit_step_one(fccm(detections, lens="brown"), target=target, first_lens=first_lens)
 
 
-@pytest.mark.parametrize("through", [FORMULA, FREE])
+@pytest.mark.parametrize("first_lens", [FORMULA, FREE])
 def test_the_size_of_corners_displacements_is_found_within_sampling_error(through):
     sigma, fits = np.array([3e-4, 2e-4, 6e-4]), []
     for seed in range(4):
         detections = photographed_with(
             drawn(tuple(sigma), seed=seed), NARROW, VIEWS, noise_px=NOISE, seed=seed
         )
-        fits.append(fitted(detections, through=through))
+        fits.append(fitted(detections, first_lens=first_lens))
     # 54 corners less what surface and poses take of them, 4 boards: a deviation is told to 1 / sqrt(2 * 4 *
     # 40), 6 %, and that three times
     assert_allclose(np.sqrt(np.mean([fit.evidence.singles for fit in fits], axis=0)), sigma, rtol=0.18)
@@ -79,8 +79,8 @@ def test_of_a_perfect_board_little_is_determined_after_the_usual_rounds_too():
 def test_a_lens_that_its_formula_describes_has_next_to_no_displacement():
     fit = fitted(
         photographed_with(np.zeros_like(BOARD.points), NARROW, VIEWS, noise_px=NOISE),
-        target="flat",
-        through=FREE,
+        shape="flat",
+        first_lens=FREE,
     )
     lens = fit.estimate.camera.lens
     assert isinstance(lens, FreeLens)
@@ -111,7 +111,7 @@ def with_smooth_errors(detections: Detections, sigma: float) -> Detections:
 def test_independent_errors_have_a_likeness_of_one(seed):
     fit = fitted(
         photographed_with(np.zeros_like(BOARD.points), NARROW, VIEWS, noise_px=NOISE, seed=seed),
-        target="flat",
+        shape="flat",
     )
     assert 1.0 <= fit.evidence.likeness < 1.2  # 12 patterns, 2 axes, 15 views: told to sqrt(2 / 360), 7 %
 
@@ -122,7 +122,7 @@ def test_smooth_errors_are_told_by_their_likeness():
         detections = with_smooth_errors(
             photographed_with(np.zeros_like(BOARD.points), NARROW, VIEWS, noise_px=NOISE), sigma
         )
-        fit = fitted(detections, target="flat")
+        fit = fitted(detections, shape="flat")
         told.append(fit.evidence.likeness)
         # a pattern has 54 times the power of a corner; 9 of the 12 patterns got sigma^2 / 9 of it; noise is
         # that of all errors together

@@ -25,8 +25,8 @@ def photographs() -> Detections:
     return photographed_with(bowed(0.5e-3), NARROW, 8, noise_px=0.1, seed=3)
 
 
-def fitted(photographs: Detections, shape: str, through: str) -> StepOneFit:
-    return fit_step_one(fccm(photographs, lens="brown"), target=shape, through=through)
+def fitted(photographs: Detections, shape: str, first_lens: str) -> StepOneFit:
+    return fit_step_one(fccm(photographs, lens="brown"), target=shape, first_lens=first_lens)
 
 
 @pytest.fixture(scope="module", params=KINDS, ids="-".join)

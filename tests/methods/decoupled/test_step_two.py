@@ -29,7 +29,7 @@ BOWED = photographed_with(bowed(1e-3), NARROW, 10)
 @pytest.fixture(scope="module")
 def exact() -> StepOneFit:
     """Step 1 of noise-free photographs of a bowed board."""
-    return fit_step_one(fccm(BOWED, lens="brown"), target="free", through=FREE)
+    return fit_step_one(fccm(BOWED, lens="brown"), shape="free", first_lens=FREE)
 
 
 def rays_of(camera: Camera) -> np.ndarray:
@@ -49,7 +49,7 @@ def test_pairs_are_corners_of_the_real_target_and_the_pixels_where_they_were_see
 
 def test_corners_that_are_missing_make_no_pairs():
     detections = photographed(NARROW, 8, whole=False, fill=(0.9, 0.95))
-    fit = fit_step_one(fccm(detections, lens="brown"), target="flat", through=FORMULA)
+    fit = fit_step_one(fccm(detections, lens="brown"), shape="flat", first_lens=FORMULA)
     assert len(pairs_of_step_one(fit)[0]) == detections.corners < 8 * 54
 
 
@@ -79,7 +79,7 @@ def test_any_formula_of_the_table_is_fitted_as_well_as_it_can(exact, lens):
 
 @pytest.mark.parametrize("lens", ["brown", "rational"])
 def test_a_lens_of_the_plane_cannot_take_what_was_seen_past_90_degrees(lens):
-    fit = fit_step_one(fccm(photographed(WIDE, 12)), target="flat", through=FORMULA)
+    fit = fit_step_one(fccm(photographed(WIDE, 12)), shape="flat", first_lens=FORMULA)
     with pytest.raises(CalibrationError, match="--lens kannala_brandt"):
         formula_from_pairs(fit, lens)
 

@@ -1,7 +1,7 @@
 """Who is compared, in the words of a user: a method, its lens, its settings.
 
 `METHOD`, `METHOD:LENS` with the lens as everywhere (`fccm:brown:k1,k2`), and any setting of the method's own
-by its name (`decoupled:target=flat`, `fccm:rational:loss=huber`).
+by its name (`decoupled:shape=flat`, `fccm:rational:loss=huber`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ __all__ = ["USUAL", "Entry", "parse_entry"]
 
 USUAL = (
     *METHODS,
-    "decoupled:target=free",
-    "decoupled:target=flat",
+    "decoupled:shape=free",
+    "decoupled:shape=flat",
     "fccm:rational",
 )  # fccm alone: brown, or kannala_brandt if wide
 CHOSEN = ("auto", "free")  # lenses that are in no table
@@ -38,7 +38,7 @@ def parse_entry(text: str) -> Entry:
     """The entry of a description.
 
     Args:
-        text: such as `fccm`, `fccm:brown`, `fccm:brown:k1,k2` or `decoupled:brown:target=flat`.
+        text: such as `fccm`, `fccm:brown`, `fccm:brown:k1,k2` or `decoupled:brown:shape=flat`.
     Raises:
         InputError: a method, a lens or a setting that is not there, or a value that is none.
     """

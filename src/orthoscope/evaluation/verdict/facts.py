@@ -55,7 +55,7 @@ def situation_of(found: Findings) -> Situation:
         lens=str(settings.get("lens", "")),
         shape=calibration.target_shape.kind,
         base=str(settings.get("base", "")),
-        through=str(settings.get("through", "")),
+        first_lens=str(settings.get("first_lens", "")),
         loss=str(settings.get("loss", "")),
         views=views,
         distinct=distinct,

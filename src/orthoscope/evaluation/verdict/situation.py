@@ -19,8 +19,8 @@ class Situation:
     """The facts.
 
     Args:
-        method, lens, base, through: what the calibration was made by, as it is called again; empty where it
-            has no such setting.
+        method, lens, base, first_lens: what the calibration was made by, as it is called again; empty
+            where it has no such setting.
         shape: of the target, that it came to.
         views: photographs that were used.
         distinct: of these, those that are not near-copies of another.
@@ -55,7 +55,7 @@ class Situation:
     lens: str = "free"
     shape: str = "flat"
     base: str = "brown"
-    through: str = "free"
+    first_lens: str = "free"
     views: int = 15
     distinct: int = 15
     converged: bool = True

@@ -18,6 +18,9 @@ __all__ = ["CandidateRow", "candidate_in", "settings_in"]
 CandidateRow = tuple[str, str, Number, Number, Number]
 # How the lens of a candidate ended that was fitted to pairs.
 FROM_PAIRS = " from pairs"
+# Settings of decoupled that bear another name now, and those that nothing asks for any more.
+NOW = {"target": "shape", "through": "first_lens", "among": "formulas"}
+GONE = ("folds",)
 
 
 def candidate_in(row: CandidateRow, settings: Mapping[str, Any]) -> Candidate:
@@ -36,7 +39,10 @@ def candidate_in(row: CandidateRow, settings: Mapping[str, Any]) -> Candidate:
 
 def settings_in(method: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings as they are called now, which give the same fit."""
-    if method == "decoupled" and "through" in settings and "fit" not in settings:
-        own = "free" if settings["through"] == "free" else settings.get("base")
-        return {**settings, "fit": "joint" if settings.get("lens") == own else "pairs"}
-    return dict(settings)
+    if method != "decoupled":
+        return dict(settings)
+    now = {NOW.get(name, name): value for name, value in settings.items() if name not in GONE}
+    if "first_lens" in now and "fit" not in now:
+        own = "free" if now["first_lens"] == "free" else now.get("base")
+        now["fit"] = "joint" if now.get("lens") == own else "pairs"
+    return now

@@ -150,7 +150,7 @@ class SituationFile(Record):
     lens: str
     shape: str
     base: str
-    through: str
+    first_lens: str
     views: int
     distinct: int
     converged: bool

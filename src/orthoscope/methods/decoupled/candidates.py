@@ -37,19 +37,19 @@ JOINT, PAIRS = "joint", "pairs"
 class Model(NamedTuple):
     """One way to explain the photographs.
 
-    base: a formula.  target: the kind of its shape.  through: `free` or `formula`, the lens of step 1.
+    base: a formula.  shape: the kind of the target's. first_lens: `free` or `formula`, the lens of step 1.
     formula: fitted to the pairs of step 1; None where step 1's camera is taken as it is.
     """
 
     base: str
-    target: str
-    through: str
+    shape: str
+    first_lens: str
     formula: str | None = None
 
     @property
     def lens(self) -> str:
         """What the camera's lens is called."""
-        return self.formula or (FREE if self.through == FREE else self.base)
+        return self.formula or (FREE if self.first_lens == FREE else self.base)
 
     @property
     def fit(self) -> str:
@@ -82,7 +82,7 @@ class Candidates:
             squares = self._squares(model)
         except CalibrationError:
             squares = np.full(len(self.detections.views), np.nan)
-        return Contender(model.base, model.target, model.lens, model.fit, squares)
+        return Contender(model.base, model.shape, model.lens, model.fit, squares)
 
     def camera(self, model: Model) -> tuple[Camera, tuple[str, ...]]:
         """The model's camera, and the names of its parameters that were fitted.
@@ -109,7 +109,7 @@ class Candidates:
         return fit_flat(self.detections, lens=base, skew=self._skew)
 
     def _step_one(self, model: Model) -> StepOneFit:
-        return fit_step_one(self.flat(model.base), target=model.target, through=model.through)
+        return fit_step_one(self.flat(model.base), shape=model.shape, first_lens=model.first_lens)
 
     def _linearised(self, model: Model) -> Linearised:
         return linearised(self.step_one(model))

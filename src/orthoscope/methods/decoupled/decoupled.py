@@ -63,7 +63,7 @@ class _Open(NamedTuple):
 
     bases: tuple[str, ...]
     shapes: tuple[str, ...]
-    through: tuple[str, ...]
+    first_lens: tuple[str, ...]
     formulas: tuple[str, ...]
     fits: tuple[str, ...]
 
@@ -73,11 +73,11 @@ def decoupled(
     detections: Detections,
     *,
     lens: str = AUTO,
-    target: str = AUTO,
+    shape: str = AUTO,
     base: str = AUTO,
-    through: str = AUTO,
+    first_lens: str = AUTO,
     fit: str = AUTO,
-    among: Sequence[str] = (),
+    formulas: Sequence[str] = (),
     skew: bool = False,
     judging: Progress | None = None,
 ) -> Calibration:
@@ -86,18 +86,18 @@ def decoupled(
 
     Args:
         lens: a name of LENSES (with the coefficients to free, `brown:k1,k2`), `free`, or `auto`: the lens of
-            step 1, or out of the names in `among` the simplest that foresees views not used as well as the
+            step 1, or out of the names in `formulas` the simplest that foresees views not used as well as the
             best.
-        target: its shape, `flat`, `smooth`, `free` or `auto`.
+        shape: of the target, `flat`, `smooth`, `free` or `auto`.
         base: the formula under the free lens; `auto` takes, of BASES, what foresees best.
-        through: the lens of step 1, `free`, `formula` (the base alone) or `auto`.
+        first_lens: of step 1, `free`, `formula` (the base alone) or `auto`.
         fit: of a formula, `joint` (with poses and target), `pairs` (to what step 1 found) or `auto`.
         judging: called with (models judged, models to judge).
     Raises:
         CalibrationError: the views cannot tell the camera.
         InputError: a setting is none.
     """
-    left = _open(lens, target, base, through, fit, among)
+    left = _open(lens, shape, base, first_lens, fit, formulas)
     used = fccm(without_outliers(detections, lens=base), lens=base, skew=skew).detections
     candidates = Candidates(used, skew=skew)
     assumptions: tuple[str, ...] = ()
@@ -109,59 +109,57 @@ def decoupled(
     flat = candidates.flat(model.base)
     settings = {
         "lens": model.lens,
-        "target": model.target,
+        "shape": model.shape,
         "base": model.base,
-        "through": model.through,
+        "first_lens": model.first_lens,
         "fit": model.fit,
         "skew": skew,
     }
     return _calibration(candidates, model, settings, (*flat.assumptions, *assumptions), told)
 
 
-def _open(lens: str, target: str, base: str, through: str, fit: str, among: Sequence[str]) -> _Open:
+def _open(lens: str, shape: str, base: str, first_lens: str, fit: str, formulas: Sequence[str]) -> _Open:
     """What the settings leave open.
 
     Raises InputError for a setting that is none, or for two that contradict each other.
     """
-    if target not in (AUTO, *SHAPES):
+    if shape not in (AUTO, *SHAPES):
+        raise InputError(f"target shape {shape!r} is not known; expected one of {AUTO}, {', '.join(SHAPES)}.")
+    if first_lens not in (AUTO, FREE, FORMULA):
         raise InputError(
-            f"target shape {target!r} is not known; expected one of {AUTO}, {', '.join(SHAPES)}."
-        )
-    if through not in (AUTO, FREE, FORMULA):
-        raise InputError(
-            f"through is {through!r}; expected 'free' (a free lens in step 1), 'formula' (its base alone) or"
-            " 'auto'."
+            f"first_lens is {first_lens!r}; expected 'free' (a free lens in step 1), 'formula' (its base"
+            " alone) or 'auto'."
         )
     if fit not in (AUTO, JOINT, PAIRS):
         raise InputError(
             f"fit is {fit!r}; expected 'joint' (a formula with poses and target), 'pairs' (a formula to what"
             " step 1 found) or 'auto'."
         )
-    if lens == FREE and through == FORMULA:
+    if lens == FREE and first_lens == FORMULA:
         raise InputError(
-            "lens is 'free' and through is 'formula'; expected one of the two. A free lens comes through a"
+            "lens is 'free' and first_lens is 'formula'; expected one of the two. A free lens comes through a"
             " free lens."
         )
-    formulas = by_simplicity(name for name in (among if lens == AUTO else (lens,)) if name != FREE)
-    for name in (*formulas, *(() if base == AUTO else (base,))):
+    wanted = by_simplicity(name for name in (formulas if lens == AUTO else (lens,)) if name != FREE)
+    for name in (*wanted, *(() if base == AUTO else (base,))):
         parse_lens(name)
-    lenses_of_step_one = (FREE,) if lens == FREE else (FORMULA, FREE) if through == AUTO else (through,)
+    lenses_of_step_one = (FREE,) if lens == FREE else (FORMULA, FREE) if first_lens == AUTO else (first_lens,)
     return _Open(
         BASES if base == AUTO else (base,),
-        SHAPES if target == AUTO else (target,),
+        SHAPES if shape == AUTO else (shape,),
         lenses_of_step_one,
-        formulas,
+        wanted,
         (JOINT, PAIRS) if fit == AUTO else (fit,),
     )
 
 
 def _assumed(left: _Open, used: Detections, skew: bool) -> Model:
     """The model for views that are too few to judge by: the simplest that the settings allow."""
-    shape, through, formula = left.shapes[0], left.through[0], next(iter(left.formulas), None)
-    if formula and JOINT in left.fits and through == FORMULA:
+    shape, first_lens, formula = left.shapes[0], left.first_lens[0], next(iter(left.formulas), None)
+    if formula and JOINT in left.fits and first_lens == FORMULA:
         return Model(formula, shape, FORMULA)
     base = left.bases[0] if len(left.bases) == 1 else fccm(used, skew=skew).settings["lens"]
-    return Model(base, shape, through, formula)
+    return Model(base, shape, first_lens, formula)
 
 
 def _chosen(
@@ -173,8 +171,8 @@ def _chosen(
     """
     corners = np.array([len(view.ids) for view in candidates.detections.views], dtype=float)
     tried: dict[Model, Contender] = {}
-    of_base = [Model(base, left.shapes[-1], left.through[-1]) for base in left.bases]
-    to_do = len(of_base) + len(left.shapes) * len(left.through) - 1 + 2 * len(left.formulas)
+    of_base = [Model(base, left.shapes[-1], left.first_lens[-1]) for base in left.bases]
+    to_do = len(of_base) + len(left.shapes) * len(left.first_lens) - 1 + 2 * len(left.formulas)
 
     def judge(models: Sequence[Model]) -> list[Contender]:
         for model in models:
@@ -189,7 +187,7 @@ def _chosen(
         base = fitting[first_as_good(judge(fitting), corners)].base
     else:
         base = left.bases[0]
-    models = [Model(base, shape, through) for shape, through in product(left.shapes, left.through)]
+    models = [Model(base, shape, first_lens) for shape, first_lens in product(left.shapes, left.first_lens)]
     model = models[richest_unless_worse(judge(models), corners)] if len(models) > 1 else models[0]
     if left.formulas:
         models = _with_formulas(model, left)
@@ -215,14 +213,20 @@ def _with_formulas(model: Model, left: _Open) -> list[Model]:
     """
     found: list[Model] = []
     for formula in left.formulas:
-        if PAIRS in left.fits and (FREE in left.through or formula != model.base):
-            found.append(Model(model.base, model.target, FREE if FREE in left.through else FORMULA, formula))
-        if JOINT in left.fits and FORMULA in left.through and (len(left.bases) > 1 or formula in left.bases):
-            found.append(Model(formula, model.target, FORMULA))
+        if PAIRS in left.fits and (FREE in left.first_lens or formula != model.base):
+            found.append(
+                Model(model.base, model.shape, FREE if FREE in left.first_lens else FORMULA, formula)
+            )
+        if (
+            JOINT in left.fits
+            and FORMULA in left.first_lens
+            and (len(left.bases) > 1 or formula in left.bases)
+        ):
+            found.append(Model(formula, model.shape, FORMULA))
     if not found:
         raise InputError(
-            f"a formula cannot be fitted {' or '.join(left.fits)} through {' or '.join(left.through)};"
-            " expected fit 'joint' with through 'formula', or fit 'pairs' with through 'free'."
+            f"a formula cannot be fitted {' or '.join(left.fits)} with first_lens"
+            f" {' or '.join(left.first_lens)}; expected fit 'joint' with first_lens 'formula', or fit 'pairs' with first_lens 'free'."
         )
     return found
 
@@ -254,6 +258,6 @@ def _calibration(
         target_shape=shape,
         parameters=fit.with_formula(camera, names) if model.formula else fit.evidence.parameters,
         candidates=told,
-        free_camera=fit.estimate.camera if model.through == FREE and model.formula else None,
+        free_camera=fit.estimate.camera if model.first_lens == FREE and model.formula else None,
         variances=fit.evidence.variances,
     )

@@ -95,19 +95,21 @@ class StepOneFit:
         )
 
 
-def fit_step_one(flat: Calibration, *, target: str, through: str) -> StepOneFit:
+def fit_step_one(flat: Calibration, *, shape: str, first_lens: str) -> StepOneFit:
     """Camera, poses and shape together.
 
-    flat: a calibration of a flat target to start from; its parameters are freed. target: `flat`, `smooth` or
-    `free`. through: FREE or FORMULA, the lens.
+    Args:
+        flat: a calibration of a flat target to start from; its parameters are freed.
+        shape: of the target, `flat`, `smooth` or `free`.
+        first_lens: FREE or FORMULA, the lens.
     """
     detections, free = flat.detections, flat.uncertainty.names
-    camera = _with_displacement(flat.camera) if through == FREE else flat.camera
+    camera = _with_displacement(flat.camera) if first_lens == FREE else flat.camera
     observations = Observations.by_corner(detections)
     points, seen = detections.target.points, observations.present.max(0) > 0
-    basis = polynomials(points, seen) if target != "flat" else np.zeros((len(points), 0))
+    basis = polynomials(points, seen) if shape != "flat" else np.zeros((len(points), 0))
     energy = _energy(camera)
-    measurements = Measurements(observations, camera, free, corners_move=target != "flat")
+    measurements = Measurements(observations, camera, free, corners_move=shape != "flat")
     estimate = DecoupledEstimate(
         camera,
         observations.poses_of(flat.camera_from_target),
@@ -128,7 +130,7 @@ def fit_step_one(flat: Calibration, *, target: str, through: str) -> StepOneFit:
             free,
             surface=basis,
             energy=energy,
-            single=target == "free",
+            single=shape == "free",
             precisions=precisions,
         )
         options = Options(tolerance=FINE if last else COARSE, max_steps=50)
@@ -140,7 +142,7 @@ def fit_step_one(flat: Calibration, *, target: str, through: str) -> StepOneFit:
         renewed = evidence.renewed(problem, estimate, solution.cost, known)
         if last:
             return StepOneFit(
-                target, problem, estimate, renewed, renewed.noise * known.camera, steps, solution.status.value
+                shape, problem, estimate, renewed, renewed.noise * known.camera, steps, solution.status.value
             )
         settled = renewed.agrees_with(evidence)
         evidence = renewed
