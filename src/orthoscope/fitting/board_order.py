@@ -51,16 +51,20 @@ class Turn:
 def turns_of(target: Target) -> list[Turn]:
     """The turns that a detector cannot tell from none, the turn by nothing first.
 
-    A chessboard's two colours change places unless both of its counts are odd, or both even.
+    A chessboard's two colours change places unless both of its counts are odd, or both even; discs in a grid
+    may look the same with other counts, too.
     """
     found = [Turn(np.eye(3), np.arange(len(target.points)))]
-    if target.grid is None or sum(target.grid) % 2:
+    discs, same = target.disc_radius > 0, target.symmetries()
+    if target.grid is None or (not same if discs else sum(target.grid) % 2):
         return found
     columns, rows = target.grid
     ids = np.arange(rows * columns).reshape(rows, columns)
     for quarters in (1, 2, 3) if rows == columns else (2,):
         cos, sin = round(np.cos(0.5 * np.pi * quarters)), round(np.sin(0.5 * np.pi * quarters))
         rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        if discs and not any(np.array_equal(np.rot90(ids, quarters).ravel(), way) for way in same):
+            continue
         corners = np.empty(rows * columns, dtype=np.int64)
         corners[ids.ravel()] = np.rot90(ids, quarters).ravel()
         found.append(Turn(rotation, corners))
