@@ -7,6 +7,7 @@ takes one method.
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import inspect
 from collections import UserDict
 from collections.abc import Callable
@@ -28,7 +29,8 @@ class _Methods(UserDict[str, Any]):
 
     def __getitem__(self, name: str) -> Callable[..., Calibration]:
         if isinstance(self.data[name], str):
-            self.data[name] = getattr(importlib.import_module(self.data[name]), name)
+            module, _, attribute = self.data[name].partition(":")
+            self.data[name] = getattr(importlib.import_module(module), attribute or name)
         return self.data[name]
 
 
@@ -40,6 +42,20 @@ METHODS = _Methods(
         "nmldc": f"{__name__}.mldc.nmldc",
     }
 )
+
+
+def _of_others() -> dict[str, str]:
+    """Methods of other packages: entry points of the group `orthoscope.methods`, `name =
+    "package.module:name"`.
+
+    They are functions like these here; where the attribute has another name than the entry, it is the entry's
+    that counts.
+    """
+    found = importlib.metadata.entry_points(group="orthoscope.methods")
+    return {entry.name: entry.value for entry in found if entry.name not in METHODS.data}
+
+
+METHODS.data.update(_of_others())
 
 
 @with_one_thread
