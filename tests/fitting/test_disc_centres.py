@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from orthoscope.evaluation.evaluate import evaluate_on
 from orthoscope.fitting.disc_centres import at_disc_centres, disc_offsets, has_outlines
+from orthoscope.formats.own.json import load_detections, save
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.methods import METHODS, calibrate
 from orthoscope.models.camera import Camera, Intrinsics
@@ -91,6 +92,13 @@ def test_calibration_on_outlines_is_biased_without_the_correction_and_not_with_i
     assert off(corrected) < 0.1 * off(plain)  # one round: what is left is of second order
     assert corrected.rms_px < 0.1 * plain.rms_px
     assert corrected.detections.disc_centres
+
+
+def test_a_file_keeps_whether_pixels_are_discs_centres(scene, tmp_path):
+    seen = outlines_of(scene)
+    for detections in (seen, replace(seen, disc_centres=True)):
+        save(detections, tmp_path / "detections.json")
+        assert has_outlines(load_detections(tmp_path / "detections.json")) == has_outlines(detections)
 
 
 def test_a_camera_is_judged_on_other_photographs_at_the_discs_centres(scene):
