@@ -58,7 +58,7 @@ def some_calibration() -> Calibration:
         camera_from_target=tuple(poses),
         detections=some_detections(),
         method="fccm",
-        settings={"lens": "brown", "free": ["k1", "p1"], "loss": None, "sigma": 0.1, "skew": True},
+        settings={"lens": "brown", "loss": "cauchy", "loss_scale": 0.1, "max_steps": 200, "skew": True},
         uncertainty=Uncertainty(("fx=fy", "k1"), np.array([[0.3, 1e-9], [1e-9, 1 / 7]])),
         status="converged: the step no longer changes the parameters",
         steps=9,
@@ -74,7 +74,14 @@ def a_decoupled_calibration() -> Calibration:
         some_calibration(),
         camera=Camera((640, 480), CAMERA.intrinsics, FREE_LENSES_TO_TRY["free over brown"]),
         method="decoupled",
-        settings={"lens": "free", "target": "free", "base": "brown", "through": "free", "skew": False},
+        settings={
+            "lens": "free",
+            "target": "free",
+            "base": "brown",
+            "through": "free",
+            "fit": "joint",
+            "skew": False,
+        },
         target_shape=TargetShape("free", 1e-3 * generator.standard_normal((12, 3))),
         parameters=41.0 + 1 / 3,
         uncertainty=Uncertainty(("fx", "k1"), np.array([[0.3, 0.0], [0.0, 1 / 7]]), np.eye(2) / 9),
@@ -327,7 +334,7 @@ def test_an_empty_file_is_refused(tmp_path, content):
 )
 def test_a_file_that_is_no_json_is_refused(tmp_path, content):
     (tmp_path / "file.json").write_bytes(content)
-    with pytest.raises(InputError, match=r"file\.json is not JSON"):
+    with pytest.raises(InputError, match=r"file\.json is not (JSON|text)"):
         load(tmp_path / "file.json")
 
 
@@ -482,3 +489,54 @@ def test_a_lens_outside_the_table_is_refused(tmp_path):
 
     with pytest.raises(InputError, match="Homemade cannot be saved; expected one of LENSES: brown"):
         save(Camera((640, 480), CAMERA.intrinsics, Homemade()), tmp_path / "camera.json")
+
+
+def as_written_before(made: Calibration, path, **settings: str) -> None:
+    """The file of a decoupled calibration as version 0.1.0 wrote it: candidates in rows, no setting `fit`."""
+    save(made, path)
+    written = json.loads(path.read_text())
+    del written["settings"]["fit"]
+    written["settings"] |= settings
+    written["candidates"] = [
+        ["flat", "brown", 0.35, 0.006, 0.3],
+        ["free", "free", 0.05, None, 0.0],
+        ["free", "rational from pairs", None, None, 0.1],
+    ]
+    path.write_text(json.dumps(written))
+
+
+def test_a_calibration_of_the_version_before_is_read(tmp_path):
+    made = a_decoupled_calibration()
+    as_written_before(made, tmp_path / "calibration.json")
+    again = load_calibration(tmp_path / "calibration.json")
+    assert again.settings == made.settings
+    assert [(one.lens, one.base, one.fit) for one in again.candidates] == [
+        ("brown", "brown", "joint"),
+        ("free", "brown", "joint"),
+        ("rational", "rational", "pairs"),
+    ]
+    save(again, tmp_path / "again.json")
+    assert load_calibration(tmp_path / "again.json").settings == again.settings
+
+
+def test_a_formula_of_the_version_before_is_fitted_again_as_it_was(tmp_path):
+    as_written_before(a_decoupled_calibration(), tmp_path / "calibration.json", lens="rational")
+    assert load_calibration(tmp_path / "calibration.json").settings["fit"] == "pairs"
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"method": "zhang"}, "'zhang' is not known; expected one of decoupled"),
+        ({"settings": {"lense": "brown"}}, "no setting 'lense'; it has lens"),
+        ({"settings": {"lens": 5}}, "'lens' of method 'fccm' is 5; expected a word"),
+        ({"settings": {"skew": "yes"}}, "is 'yes'; expected true or false"),
+        ({"settings": {"loss_scale": True}}, "is True; expected a number"),
+    ],
+)
+def test_a_method_or_setting_that_is_none_is_named_when_its_file_is_read(tmp_path, changes, told):
+    path = tmp_path / "calibration.json"
+    save(some_calibration(), path)
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+    with pytest.raises(InputError, match=re.escape(told)):
+        load_calibration(path)

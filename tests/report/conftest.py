@@ -55,7 +55,7 @@ def photographed(
         camera_from_target=tuple(poses),
         detections=detections,
         method="fccm",
-        settings={"lens": "brown", "skew": False, "loss": "squares", "free": ("k1", "k2", "p1", "p2", "k3")},
+        settings={"lens": "brown", "skew": False, "loss": "linear"},
         uncertainty=_uncertainty(camera),
         status="converged: the step no longer changes the parameters",
         steps=9,

@@ -33,7 +33,7 @@ from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
-from orthoscope.methods import METHODS
+from orthoscope.methods import METHODS, check_settings
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
@@ -145,8 +145,9 @@ def evaluate(
     """Judge a calibration by photographs it has not seen, by its residuals and by what its views cover.
 
     folds: of views; the calibration's own method is called again on each (docs/conventions.md). executor,
-    progress: as in `held_out`.
+    progress: as in `held_out`. Raises InputError where the calibration's method or a setting is none.
     """
+    check_settings(calibration.method, calibration.settings)
     detections = calibration.detections
     refit = partial(METHODS[calibration.method], **calibration.settings)
     unseen = held_out(detections, refit, folds=folds, executor=executor, progress=progress)

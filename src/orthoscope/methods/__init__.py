@@ -10,8 +10,8 @@ import importlib
 import importlib.metadata
 import inspect
 from collections import UserDict
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, get_origin, get_type_hints
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
@@ -19,7 +19,11 @@ from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.targets.detections import Detections
 
-__all__ = ["METHODS", "calibrate", "settings_of"]
+__all__ = ["METHODS", "calibrate", "check_settings", "settings_of"]
+
+
+# What a message calls the kinds of plain values.
+KINDS_OF_VALUES = {str: "a word", bool: "true or false", int: "a whole number", float: "a number"}
 
 
 class _Methods(UserDict[str, Any]):
@@ -69,9 +73,7 @@ def calibrate(detections: Detections, *, method: str = "decoupled", **settings: 
     Raises CalibrationError where the views cannot tell the camera, InputError for a method or a setting that
     is none.
     """
-    known = settings_of(method)
-    if unknown := sorted(set(settings) - set(known)):
-        raise InputError(f"method {method!r} has no setting {unknown[0]!r}; it has {', '.join(known)}.")
+    check_settings(method, settings)
     found = METHODS[method](detections, **settings)
     if not has_outlines(detections):
         return found
@@ -80,6 +82,39 @@ def calibrate(detections: Detections, *, method: str = "decoupled", **settings: 
         detections, found.camera, found.camera_from_target, images, shape=found.target_shape
     )
     return METHODS[method](moved, **settings)
+
+
+def check_settings(method: str, settings: Mapping[str, Any]) -> None:
+    """Lets settings pass that a method has, with values of the kind that each takes.
+
+    Args:
+        method: a name of METHODS.
+        settings: by name.
+    Raises:
+        InputError: a method, a setting or a value's kind is none.
+    """
+    known = settings_of(method)
+    if unknown := sorted(set(settings) - set(known)):
+        raise InputError(f"method {method!r} has no setting {unknown[0]!r}; it has {', '.join(known)}.")
+    kinds = get_type_hints(METHODS[method])
+    for name, value in settings.items():
+        if _is_misfit(value, kinds[name]):
+            raise InputError(
+                f"setting {name!r} of method {method!r} is {value!r}; expected {_told(kinds[name])}."
+            )
+
+
+def _is_misfit(value: Any, kind: Any) -> bool:
+    """Whether a plain value is of another kind than a parameter says; functions are let pass."""
+    if kind is float:
+        return isinstance(value, bool) or not isinstance(value, int | float)
+    if kind in (str, bool, int):
+        return type(value) is not kind
+    return get_origin(kind) is Sequence and (isinstance(value, str) or not isinstance(value, Sequence))
+
+
+def _told(kind: Any) -> str:
+    return KINDS_OF_VALUES.get(kind, "a list")
 
 
 def settings_of(method: str) -> list[str]:

@@ -15,9 +15,11 @@ import msgspec
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty, Variances
+from orthoscope.formats.own.earlier import CandidateRow, candidate_in, settings_in
 from orthoscope.formats.own.struct import FileStruct
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.pose import Pose
+from orthoscope.methods import check_settings
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Lens
@@ -283,7 +285,7 @@ class CalibrationFile(FileStruct, kw_only=True):
     settings: dict[str, Any]
     assumptions: list[str] = []
     parameters: float | None = None
-    candidates: list[CandidateFile] = []
+    candidates: list[CandidateFile | CandidateRow] = []
     variances: VariancesFile | None = None
     free_camera: CameraFile | None = None
     camera_from_target: list[PoseFile]
@@ -315,19 +317,24 @@ class CalibrationFile(FileStruct, kw_only=True):
         )
 
     def core(self) -> Calibration:
+        settings = settings_in(self.method, self.settings)
+        check_settings(self.method, settings)
         return Calibration(
             camera=self.camera.core(),
             camera_from_target=tuple(pose.core() for pose in self.camera_from_target),
             detections=self.detections.core(),
             method=self.method,
-            settings=self.settings,
+            settings=settings,
             uncertainty=self.uncertainty.core(),
             status=self.status,
             steps=self.steps,
             version=self.version,
             assumptions=tuple(self.assumptions),
             parameters=float("nan") if self.parameters is None else self.parameters,
-            candidates=tuple(candidate.core() for candidate in self.candidates),
+            candidates=tuple(
+                candidate_in(candidate, settings) if isinstance(candidate, tuple) else candidate.core()
+                for candidate in self.candidates
+            ),
             variances=self.variances and self.variances.core(),
             free_camera=self.free_camera and self.free_camera.core(),
             **({"target_shape": self.target_shape.core()} if self.target_shape else {}),
