@@ -11,6 +11,7 @@ from numpy.testing import assert_array_equal
 from helpers.target_laws import every_board
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import DETECTORS, see
+from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
@@ -37,9 +38,12 @@ def margin(target) -> float:
 
 
 def seen(renderer: Renderer, target, pose: Pose, seed: int = 0):
-    """What the detector sees in a photograph, and where the corners truly are."""
+    """What the detector sees in a photograph, and where corners, or the centres of outlines, truly are."""
     picture = renderer.photograph(target, pose, rng=np.random.default_rng(seed))
-    return see(picture, target), renderer.camera.project(pose.apply(target.points))
+    truth = renderer.camera.project(pose.apply(target.points))
+    if target.disc_radius:
+        truth += disc_offsets(renderer.camera, pose, target.points, target.disc_radius)
+    return see(picture, target), truth
 
 
 def check_ids(target, sight, truth: np.ndarray) -> None:

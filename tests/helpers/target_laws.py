@@ -8,6 +8,7 @@ from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.board import Board
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.circles import Circles
 
 BOARDS: tuple[Board, ...] = (
     Chessboard(9, 6, 0.025),
@@ -18,6 +19,9 @@ BOARDS: tuple[Board, ...] = (
     Charuco(7, 5, 0.03, 0.022, "DICT_5X5_100"),
     Charuco(5, 8, 0.03, 0.024, "DICT_4X4_50", legacy=True),
     AprilGrid(4, 3, 0.05, 0.3),
+    Circles(4, 11, 0.02, "asymmetric", 0.008),
+    Circles(5, 6, 0.02, "asymmetric", 0.016),
+    Circles(6, 6, 0.02, "symmetric", 0.008),
 )
 
 every_board = pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.description)

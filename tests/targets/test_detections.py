@@ -62,7 +62,7 @@ def test_a_length_that_is_not_understood_is_refused(text):
 
 @pytest.mark.parametrize(
     "text",
-    ["chessboard", "chessboard:9x6", "chessboard:9:6:25mm", "circles:9x6:25mm", "chessboard:9.5x6:25mm", ""],
+    ["chessboard", "chessboard:9x6", "chessboard:9:6:25mm", "rings:9x6:25mm", "chessboard:9.5x6:25mm", ""],
 )
 def test_a_target_that_is_not_understood_is_refused(text):
     with pytest.raises(InputError, match="expected chessboard:COLUMNSxROWS:SQUARE"):

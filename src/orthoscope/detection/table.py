@@ -8,11 +8,13 @@ from typing import Any
 from orthoscope.detection.aprilgrid import see_aprilgrid
 from orthoscope.detection.charuco import see_charuco
 from orthoscope.detection.chessboard import see_chessboard
+from orthoscope.detection.circles import see_circles
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.circles import Circles
 from orthoscope.targets.target import Target
 
 __all__ = ["DETECTORS", "check_can_be_seen", "see"]
@@ -21,6 +23,7 @@ DETECTORS: dict[str, Callable[[ndarray, Any], Sight | Unseen]] = {
     Chessboard.kind: see_chessboard,
     Charuco.kind: see_charuco,
     AprilGrid.kind: see_aprilgrid,
+    Circles.kind: see_circles,
 }
 
 

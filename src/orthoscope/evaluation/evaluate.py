@@ -27,6 +27,7 @@ from orthoscope.evaluation.verdict.facts import Findings, situation_of
 from orthoscope.evaluation.verdict.situation import NOTHING_KNOWN, Situation
 from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
+from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.held_out import HeldOut, held_out
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
@@ -120,6 +121,9 @@ def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | 
         )
     used = with_usable_views(detections)
     poses = resect(camera, used, shape=shape)
+    if has_outlines(used):
+        used = at_disc_centres(used, camera, poses, [view.image for view in used.views], shape=shape)
+        poses = resect(camera, used, shape=shape)
     residuals = residuals_of(camera, poses, used, shape=shape)
     estimated, observed = lateral_errors(camera, poses, used, shape=shape)
     nce = (

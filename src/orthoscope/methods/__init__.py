@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_origin, get_type_hints
 
 from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.targets.detections import Detections
@@ -66,11 +67,21 @@ def calibrate(detections: Detections, *, method: str = "decoupled", **settings: 
     """Calibrate a camera from detections by a method of METHODS; its settings are the method's own (lens,
     skew, loss, ...).
 
+    Discs are calibrated twice: what a first fit says of their tilt moves the centres of their outlines to
+    where the discs' centres are seen (`fitting/disc_centres.py`).
+
     Raises CalibrationError where the views cannot tell the camera, InputError for a method or a setting that
     is none.
     """
     check_settings(method, settings)
-    return METHODS[method](detections, **settings)
+    found = METHODS[method](detections, **settings)
+    if not has_outlines(detections):
+        return found
+    images = [view.image for view in found.detections.views]
+    moved = at_disc_centres(
+        detections, found.camera, found.camera_from_target, images, shape=found.target_shape
+    )
+    return METHODS[method](moved, **settings)
 
 
 def check_settings(method: str, settings: Mapping[str, Any]) -> None:

@@ -121,7 +121,13 @@ def simulate_detections(
             views.append(View(image, ids, corners[ids]))
         else:
             empty.append(SetAside(image, "no corner of the target lies in the image"))
-    return Detections(scene.target, scene.camera.image_size, tuple(views), tuple(empty))
+    return Detections(
+        scene.target,
+        scene.camera.image_size,
+        tuple(views),
+        tuple(empty),
+        disc_centres=scene.target.disc_radius > 0,
+    )
 
 
 def paper_scene(distortion: str, *, count: int = 20, rng: np.random.Generator) -> Scene:

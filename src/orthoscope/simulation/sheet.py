@@ -113,9 +113,14 @@ class Sheet:
         return np.abs(self._from_rim(*place)) <= reach
 
     def _from_rim(self, x: ndarray, y: ndarray) -> ndarray:
-        """The distance to the nearest disc's rim, negative inside."""
+        """The distance to the nearest disc's rim, negative inside; infinite far from all."""
         nearest = np.full(x.shape, np.inf)
-        for centre_x, centre_y, radius in self._discs:
+        if not x.size:
+            return nearest
+        centres, near = self._discs[:, :2], 2.0 * self._discs[:, 2]
+        low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+        gap = np.maximum(np.maximum(low - centres, centres - high), 0.0).max(1)
+        for centre_x, centre_y, radius in self._discs[gap < near]:
             np.minimum(nearest, np.hypot(x - centre_x, y - centre_y) - radius, out=nearest)
         return nearest
 

@@ -73,6 +73,11 @@ class Board(ABC):
         Each is (m,): entry k is the id that corner k then has. No way where the board tells its ends apart.
         """
 
+    @property
+    def disc_radius(self) -> float:
+        """Radius of the discs whose centres the corners are, metres; 0 where they are points."""
+        return 0.0
+
     def places(self) -> Float[ndarray, "m 2"]:
         """Column and row of each corner in the lattice, in steps (not whole ones where steps differ)."""
         columns, rows = self.grid

@@ -83,6 +83,7 @@ class Detections:
         views: what was found, photograph by photograph.
         set_aside: photographs without a view, with the reason.
         outliers: corners that were found and are in no view, with the reason.
+        disc_centres: whether discs' pixels are where centres are seen, not the centres of outlines.
     Raises:
         InputError: a repeated image name, or a corner that the target does not have.
     """
@@ -92,6 +93,7 @@ class Detections:
     views: tuple[View, ...]
     set_aside: tuple[SetAside, ...] = ()
     outliers: tuple[Outlier, ...] = ()
+    disc_centres: bool = False
 
     def __post_init__(self) -> None:
         width, height = (int(side) for side in self.image_size)

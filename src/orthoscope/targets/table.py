@@ -10,12 +10,13 @@ from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.board import Board
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.circles import Circles
 from orthoscope.targets.kalibr_target import kalibr_target
 from orthoscope.targets.target import Target, target_of
 
 __all__ = ["TARGETS", "as_fields", "forms", "parse_target"]
 
-TARGETS: dict[str, type[Board]] = {board.kind: board for board in (Chessboard, Charuco, AprilGrid)}
+TARGETS: dict[str, type[Board]] = {board.kind: board for board in (Chessboard, Charuco, AprilGrid, Circles)}
 
 
 def forms() -> str:

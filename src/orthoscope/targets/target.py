@@ -73,6 +73,11 @@ class Target:
         """The board's kind, a row of TARGETS; `points` where no board is known."""
         return self.board.kind if self.board else "points"
 
+    @property
+    def disc_radius(self) -> float:
+        """Radius of the discs whose centres the corners are, metres; 0 where they are points."""
+        return self.board.disc_radius if self.board else 0.0
+
     def drawing(self) -> Drawing:
         """What is printed, in the target's frame.
 

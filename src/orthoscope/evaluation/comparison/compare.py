@@ -20,10 +20,11 @@ import numpy as np
 
 from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
 from orthoscope.evaluation.metrics import held_out_nce
+from orthoscope.fitting.disc_centres import has_outlines
 from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views, held_out
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
-from orthoscope.methods import METHODS
+from orthoscope.methods import METHODS, calibrate
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
@@ -115,7 +116,7 @@ def compare(
         CalibrationError: too few views to hold any out, or the corners fit no camera.
     """
     chosen = _distinct(entries)
-    used = without_outliers(detections)
+    used = without_outliers(calibrate(detections).detections if has_outlines(detections) else detections)
     if len(used.views) < FEWEST_VIEWS:
         raise CalibrationError(
             f"{len(used.views)} of the views can be used; expected {FEWEST_VIEWS} at least, so that some can"

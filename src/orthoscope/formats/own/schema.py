@@ -85,6 +85,7 @@ class DetectionsFile(FileStruct):
     views: list[ViewFile]
     set_aside: list[tuple[str, str]] = []
     outliers: list[tuple[str, int, tuple[float, float], str]] = []
+    disc_centres: bool = False
 
     @classmethod
     def of(cls, detections: Detections) -> DetectionsFile:
@@ -94,6 +95,7 @@ class DetectionsFile(FileStruct):
             [ViewFile.of(view) for view in detections.views],
             [(image, reason) for image, reason in detections.set_aside],
             [(image, corner, pixel, reason) for image, corner, pixel, reason in detections.outliers],
+            detections.disc_centres,
         )
 
     def core(self) -> Detections:
@@ -102,7 +104,7 @@ class DetectionsFile(FileStruct):
             tuple(SetAside(*entry) for entry in self.set_aside),
             tuple(Outlier(*entry) for entry in self.outliers),
         )
-        return Detections(self.target.core(), self.image_size, views, aside, outliers)
+        return Detections(self.target.core(), self.image_size, views, aside, outliers, self.disc_centres)
 
 
 class IntrinsicsFile(FileStruct, omit_defaults=False):

@@ -1,0 +1,90 @@
+"""Finding a grid of discs: spots, the lattice that they make, the board's discs, then their outlines.
+
+Discs are black on white, or white on black; both are tried. What is returned is the centre of the ellipse
+that a disc's outline makes, which is not where the disc's centre is seen (`fitting/disc_centres.py`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orthoscope.detection.copies import resized, to_photograph
+from orthoscope.detection.disc_lattice import foreseen, laid_on, numbered
+from orthoscope.detection.disc_outlines import refined_discs, spots
+from orthoscope.detection.sight import Sight, Unseen
+from orthoscope.geometry.arrays import Float, Int, ndarray
+from orthoscope.geometry.ellipses import Ellipses
+from orthoscope.targets.circles import Circles
+
+__all__ = ["see_circles"]
+
+SIDES = (640, 1280, 2560)  # px, of the copies
+FEWEST = 6  # discs
+LEAST_SHARE = 0.15  # of the board's discs
+ENOUGH = 0.97  # of the board's discs: then no other copy is looked at
+SMALLEST = 16  # px, side of a picture
+MOST_FROM_FORESEEN = 0.8  # radii
+
+
+def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
+    """The centres of the outlines of a grid's discs, or of the part of it that can be seen.
+
+    Args:
+        grey: (h,w) uint8.
+        board: what to look for.
+    """
+    count = board.columns * board.rows
+    best: tuple[Int[ndarray, " n"], ndarray] = np.zeros(0, dtype=int), np.zeros((0, 2))
+    several, seen, shapes = False, 0, set()
+    for side in SIDES:
+        copy = resized(grey, side)
+        if copy.shape in shapes or min(copy.shape) < SMALLEST:
+            continue
+        shapes.add(copy.shape)
+        for picture, whole in ((copy, grey), (255 - copy, 255 - grey)):
+            for found in spots(picture):
+                which, places = numbered(found)
+                seen = max(seen, len(which))
+                if len(which) < max(FEWEST, LEAST_SHARE * count, len(best[0])):
+                    continue
+                discs = Ellipses(found.centres[which], found.axes[which])
+                ids, unsure = laid_on(board, discs, places, copy.shape)
+                several |= unsure
+                if (ids >= 0).sum() >= FEWEST:
+                    best = max(
+                        best, _outlined(copy, whole, board, discs, ids), key=lambda sight: len(sight[0])
+                    )
+                if len(best[0]) >= ENOUGH * count:
+                    return Sight(*best)
+    if len(best[0]) >= FEWEST:
+        return Sight(*best)
+    if several:
+        return Unseen("is in it in part only, and which part cannot be told")
+    return Unseen(f"was not found in it: {seen} discs hang together, the board has {count}")
+
+
+def _outlined(
+    copy: ndarray, grey: ndarray, board: Circles, discs: Ellipses, ids: Int[ndarray, " n"]
+) -> tuple[Int[ndarray, " m"], Float[ndarray, "m 2"]]:
+    """Ids and centres from outlines in the photograph, those of discs that were no spots included."""
+    scale = grey.shape[1] / copy.shape[1]
+    mine = ids >= 0
+    rough = Ellipses(to_photograph(discs.centres[mine], copy, grey), discs.axes[mine] * scale)
+    known, fine = ids[mine], refined_discs(grey, rough)
+    for _ in range(board.columns + board.rows):
+        good = np.isfinite(fine.centres[:, 0])
+        known, fine = known[good], Ellipses(fine.centres[good], fine.axes[good])
+        if len(known) < FEWEST:
+            break
+        more, there = foreseen(board, fine, known, grey.shape)
+        added = refined_discs(grey, there)
+        off = np.linalg.norm(added.centres - there.centres, axis=1)
+        near = off < MOST_FROM_FORESEEN * np.sqrt(np.abs(np.linalg.det(there.axes)))
+        if not near.any():
+            break
+        known = np.concatenate([known, more[near]])
+        fine = Ellipses(
+            np.concatenate([fine.centres, added.centres[near]]), np.concatenate([fine.axes, added.axes[near]])
+        )
+    order = np.argsort(known)
+    return known[order], fine.centres[order]

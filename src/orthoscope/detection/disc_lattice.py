@@ -1,0 +1,180 @@
+"""Which discs hang together as a lattice, and which of a board's discs they are.
+
+A disc's own ellipse says how the board is foreshortened where it stands: with its axes taken for unit length,
+the discs next to it stand at equal distances in four directions at right angles, however the board is tilted.
+Two discs are linked where each has the other in such a place; following links numbers the lattice.
+
+The lattice is laid onto the board in every way that puts all discs on it. A way is believed where hardly any
+disc of the board that ought to be seen next to a found one is missing, and only if no other way is as good
+but for the board's own symmetry.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Int, ndarray
+from orthoscope.geometry.ellipses import Ellipses
+from orthoscope.targets.circles import Circles
+
+__all__ = ["foreseen", "laid_on", "numbered"]
+
+AROUND = 12  # discs that may be next to one
+LIKE_SIZE = 2.2  # areas of neighbours differ by no more
+LENGTHS = (0.7, 1.42)  # of the nearest neighbour's distance
+ANGLE = 0.35  # radians from a right angle
+STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # in the order of the four directions
+MOST_MISSING = 0.12  # of the discs found
+RIVAL = 0.5  # of a shorter side's discs: with no more missing than so many, another way is as good
+MOST_OFF_BOARD = 1  # spots that joined the lattice by chance
+NEARBY = 12  # discs that foresee one
+MARGIN = 1.25  # of a disc must be in the picture for it to be seen
+
+
+def numbered(discs: Ellipses) -> tuple[Int[ndarray, " n"], Int[ndarray, "n 2"]]:
+    """The discs that hang together, most of them, and their places in a lattice of neighbours."""
+    neighbour = _neighbours(discs)
+    best: dict[int, tuple[ndarray, int]] = {}
+    left = set(range(len(neighbour)))
+    while len(left) > len(best):
+        first = left.pop()
+        placed, waiting = {first: (np.zeros(2, dtype=int), 0)}, deque([first])
+        while waiting:
+            disc = waiting.popleft()
+            place, turn = placed[disc]
+            for direction, other in enumerate(neighbour[disc]):
+                if other < 0 or other in placed:
+                    continue
+                back = int(np.flatnonzero(neighbour[other] == disc)[0])
+                placed[other] = place + STEPS[(direction + turn) % 4], (direction + turn + 2 - back) % 4
+                waiting.append(int(other))
+        left -= placed.keys()
+        if len(placed) > len(best):
+            best = placed
+    which = np.array(sorted(best), dtype=int)
+    places = np.array([best[disc][0] for disc in which.tolist()], dtype=int).reshape(-1, 2)
+    _, first, count = np.unique(places, axis=0, return_index=True, return_counts=True)
+    alone = first[count == 1]
+    return which[alone], places[alone]
+
+
+def _neighbours(discs: Ellipses) -> Int[ndarray, "n 4"]:
+    """The disc next to each in four directions, in the order from x to y; -1 where there is none."""
+    count = len(discs.centres)
+    found = np.full((count, 4), -1)
+    if count < 3:
+        return found
+    areas = np.linalg.det(discs.axes)
+    inverse = np.linalg.inv(discs.axes)
+    for disc in range(count):
+        away = discs.centres - discs.centres[disc]
+        offsets = away @ inverse[disc].T
+        far = np.hypot(*offsets.T)
+        far[disc] = np.inf
+        ratio = areas / areas[disc]
+        far[(ratio > LIKE_SIZE) | (ratio < 1.0 / LIKE_SIZE)] = np.inf
+        near = np.argpartition(far, min(AROUND, count - 1))[:AROUND]
+        near = near[np.isfinite(far[near])]
+        if not len(near):
+            continue
+        nearest = near[far[near].argmin()]
+        length = far[near] / far[nearest]
+        direction = np.arctan2(*offsets[near].T[::-1]) - np.arctan2(*offsets[nearest][::-1])
+        quarter = np.rint(direction / (0.5 * np.pi))
+        off = np.abs(direction - quarter * 0.5 * np.pi)
+        good = (off < ANGLE) & (length > LENGTHS[0]) & (length < LENGTHS[1])
+        for k in np.flatnonzero(good)[np.argsort(-off[good])]:  # the straightest last, so that it stays
+            found[disc, int(quarter[k]) % 4] = near[k]
+    for disc in range(count):
+        for direction in range(4):
+            other = found[disc, direction]
+            if other >= 0 and disc not in found[other]:
+                found[disc, direction] = -1
+    return found
+
+
+def laid_on(
+    board: Circles, discs: Ellipses, places: Int[ndarray, "n 2"], shape: tuple[int, ...]
+) -> tuple[Int[ndarray, " n"], bool]:
+    """The id of each disc, -1 for one that is not the board's, and whether there is one way only.
+
+    Args:
+        board: what was photographed.
+        discs: that hang together.
+        places: of them in the lattice, as `numbered` says.
+        shape: of the picture.
+    """
+    on_board = board.neighbour_places()
+    least = on_board.min(0) - 1
+    table = np.full(tuple(np.ptp(on_board, axis=0) + 3), -1)
+    table[tuple((on_board - least).T)] = np.arange(len(on_board))
+    ways: list[ndarray] = []
+    for quarter in range(4):
+        turned = places @ np.linalg.matrix_power(np.array([[0, 1], [-1, 0]]), quarter)
+        low, high = turned.min(0), turned.max(0)
+        for shift_x in range(on_board[:, 0].min() - low[0] - 1, on_board[:, 0].max() - high[0] + 2):
+            for shift_y in range(on_board[:, 1].min() - low[1] - 1, on_board[:, 1].max() - high[1] + 2):
+                cells = turned + np.array([shift_x, shift_y]) - least
+                inside = ((cells >= 0) & (cells < table.shape)).all(1)
+                ids = np.full(len(cells), -1)
+                ids[inside] = table[tuple(cells[inside].T)]
+                if (ids < 0).sum() <= MOST_OFF_BOARD and (ids >= 0).sum() >= 4:
+                    ways.append(ids)
+    missing = np.array([_missing(board, discs, ids, shape) for ids in ways])
+    if not len(ways) or missing.min() > MOST_MISSING * len(places):
+        return np.full(len(places), -1), False
+    off = np.array([(ids < 0).sum() for ids in ways])
+    most = missing.min() + RIVAL * min(board.columns, board.rows)
+    good = [ways[i] for i in np.flatnonzero((missing <= most) & (off <= off[missing.argmin()]))]
+    return _of_same(board, discs, good)
+
+
+def _of_same(board: Circles, discs: Ellipses, ways: list[ndarray]) -> tuple[Int[ndarray, " n"], bool]:
+    """Of ways that differ by the board's symmetry the one with corner 0 nearest to the picture's top left."""
+    first = ways[0]
+    seen = first >= 0
+    same = [np.where(seen, way[first], -1) for way in (np.arange(len(board.places())), *board.symmetries())]
+    if not all(any(np.array_equal(way, other) for other in same) for way in ways):
+        return np.full(len(first), -1), True
+    firsts = [discs.centres[seen][way[seen].argmin()].sum() for way in same]
+    return same[int(np.argmin(firsts))], False
+
+
+def _missing(board: Circles, discs: Ellipses, ids: Int[ndarray, " n"], shape: tuple[int, ...]) -> int:
+    """How many discs next to found ones ought to be seen and are not."""
+    _, where = foreseen(board, discs, ids, shape)
+    return len(where.centres)
+
+
+def foreseen(
+    board: Circles, discs: Ellipses, ids: Int[ndarray, " n"], shape: tuple[int, ...]
+) -> tuple[Int[ndarray, " k"], Ellipses]:
+    """Discs next to found ones that should be in the picture, by a parabola through the nearest found ones.
+
+    Args:
+        board: what was photographed.
+        discs: that were found.
+        ids: of these; -1 for none.
+        shape: of the picture.
+    """
+    places = board.neighbour_places()
+    mine = ids >= 0
+    known, centres, axes = ids[mine], discs.centres[mine], discs.axes[mine]
+    missing = np.setdiff1d(np.arange(len(places)), known)
+    apart = np.abs(places[missing, None] - places[known]).sum(-1)
+    next_to = np.flatnonzero(apart.min(1, initial=9) == 1)
+    where, like = [], []
+    for k in next_to:
+        nearest = np.argsort(apart[k], kind="stable")[:NEARBY]
+        x, y = (places[known[nearest]] - places[missing[k]]).T.astype(float)
+        terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+        enough = len(nearest) >= NEARBY and min(len(np.unique(x)), len(np.unique(y))) >= 3
+        width = 6 if enough else 3
+        where.append(np.linalg.lstsq(terms[:, :width], centres[nearest], rcond=None)[0][0])
+        like.append(axes[nearest[0]])
+    found = Ellipses(np.array(where).reshape(-1, 2), np.array(like).reshape(-1, 2, 2))
+    reach = MARGIN * np.linalg.norm(found.axes, axis=2)
+    inside = ((found.centres - reach > 1) & (found.centres + reach < np.array(shape[1::-1]) - 2)).all(1)
+    return missing[next_to][inside], Ellipses(found.centres[inside], found.axes[inside])

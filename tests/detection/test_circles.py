@@ -1,0 +1,78 @@
+"""Grids of discs: traps that other finders fall into, and how exactly outlines are seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orthoscope.detection.circles import see_circles
+from orthoscope.detection.disc_outlines import refined_discs
+from orthoscope.detection.sight import Sight, Unseen
+from orthoscope.fitting.disc_centres import disc_offsets
+from orthoscope.geometry.ellipses import Ellipses
+from orthoscope.geometry.pose import Pose, rotation_from_vector
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lenses import Brown
+from orthoscope.simulation.render import Renderer
+from orthoscope.targets.circles import Circles
+from orthoscope.targets.target import target_of
+
+CAMERA = Camera((640, 480), Intrinsics(600.0, 600.0, 322.0, 241.0), Brown(k1=-0.2, k2=0.05))
+RENDERER = Renderer(CAMERA)
+MOST_OFF = 0.05  # px rms of an outline's centre
+
+
+def photographed(board: Circles, turn: tuple[float, float, float], distance: float):
+    """A photograph of a board whose middle is on the axis, and where the centres of outlines are."""
+    target, rotation = target_of(board), rotation_from_vector(np.array(turn))
+    middle = 0.5 * (target.points.min(0) + target.points.max(0))
+    pose = Pose(rotation, np.array([0.0, 0.0, distance]) - rotation @ middle)
+    truth = CAMERA.project(pose.apply(target.points))
+    truth += disc_offsets(CAMERA, pose, target.points, target.disc_radius)
+    return RENDERER.photograph(target, pose, rng=np.random.default_rng(0)), truth
+
+
+def rms_off(sight: Sight | Unseen, truth: np.ndarray) -> float:
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) == len(truth)
+    return float(np.sqrt(((sight.pixels - truth[sight.ids]) ** 2).sum(1).mean()))
+
+
+def test_a_smaller_grid_is_not_seen_inside_a_larger_one():
+    picture, _ = photographed(Circles(10, 8, 0.02, "symmetric", 0.01), (0.2, 0.3, 0.0), 0.3)
+    for columns, rows in ((4, 3), (9, 8), (10, 7)):
+        sight = see_circles(picture, Circles(columns, rows, 0.02, "symmetric", 0.01))
+        assert isinstance(sight, Unseen)
+
+
+@pytest.mark.parametrize(
+    ("board", "turn", "distance"),
+    [
+        pytest.param(Circles(4, 11, 0.02, "asymmetric", 0.008), (0.3, 0.2, 0.1), 0.3, id="usual"),
+        pytest.param(Circles(3, 5, 0.04, "asymmetric", 0.04), (0.1, 0.3, 0.0), 0.3, id="large"),
+        pytest.param(Circles(4, 11, 0.02, "asymmetric", 0.012), (0.0, 1.2, 0.0), 0.36, id="grazing"),
+        pytest.param(Circles(4, 11, 0.02, "asymmetric", 0.008), (0.3, 0.2, 0.1), 0.9, id="small"),
+    ],
+)
+def test_outlines_are_seen_where_they_are(board, turn, distance):
+    picture, truth = photographed(board, turn, distance)
+    assert rms_off(see_circles(picture, board), truth) < MOST_OFF
+    assert rms_off(see_circles(255 - picture, board), truth) < MOST_OFF  # white on black
+
+
+def test_a_part_that_may_be_several_parts_of_the_board_is_not_given_ids():
+    board = Circles(10, 8, 0.02, "symmetric", 0.01)
+    picture, _ = photographed(board, (0.1, 0.1, 0.0), 0.12)  # no side is in the picture
+    sight = see_circles(picture, board)
+    assert isinstance(sight, Unseen)
+    assert "in part only" in sight.reason
+
+
+def test_an_outline_that_is_not_whole_is_no_disc():
+    picture, truth = photographed(Circles(4, 11, 0.02, "asymmetric", 0.008), (0.0, 0.0, 0.0), 0.3)
+    covered = picture.copy()
+    x, y = np.rint(truth[20]).astype(int)
+    covered[y : y + 20, x - 20 : x + 20] = 200
+    rough = Ellipses(truth[19:21], np.tile(np.eye(2) * 8.0, (2, 1, 1)))
+    assert np.isfinite(refined_discs(picture, rough).centres).all()
+    assert np.isfinite(refined_discs(covered, rough).centres[:, 0]).tolist() == [True, False]
