@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell, tell_json
 
 if TYPE_CHECKING:
     from orthoscope.evaluation.same_board import SameBoard
@@ -82,12 +83,10 @@ def evaluate(
             )
     if not others or loaded is None:
         evaluation = judged_calibration(path, folds=folds, jobs=jobs, cluster=cluster)
-        click.echo(
-            text_of(evaluation)
-            if as_json
-            else "\n".join(evaluation_lines(evaluation, verbose=verbose)) + "\n",
-            nl=False,
-        )
+        if as_json:
+            tell_json(text_of(evaluation))
+        else:
+            tell(*evaluation_lines(evaluation, verbose=verbose))
         return
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         board = target or loaded.detections.target  # type: ignore[union-attr]  # a calibration, as checked above
@@ -114,19 +113,19 @@ def evaluate(
             "views": views,
             "views_rejected": rejected,
         }
-        click.echo(to_json(numbers))
+        tell_json(to_json(numbers))
         return
-    click.echo(f"off by     {test.rms_px:.3f} px per corner, the camera fixed, poses fitted")
+    tell(f"off by     {test.rms_px:.3f} px per corner, the camera fixed, poses fitted")
     aside = test.detections.set_aside
-    click.echo(
+    tell(
         f"photos     {len(test.detections.views)} used, {len(aside)} set aside; {test.detections.corners} corners"
     )
     if board:
-        click.echo(f"board      {_board_line(board)}")
+        tell(f"board      {_board_line(board)}")
     if verbose:
         for entry in aside:
-            click.echo(f"set aside  {entry.image}: {entry.reason}")
-        click.echo(f"NCE        {test.nce:.3f} (1 is what rounding to whole pixels would give)")
+            tell(f"set aside  {entry.image}: {entry.reason}")
+        tell(f"NCE        {test.nce:.3f} (1 is what rounding to whole pixels would give)")
 
 
 def _board_line(board: SameBoard) -> str:

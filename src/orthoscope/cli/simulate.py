@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell
 
 if TYPE_CHECKING:
     from orthoscope.models.camera import Camera
@@ -131,10 +132,10 @@ def simulate(
     scene = Scene(camera, board, poses)
     save(simulate_detections(scene, noise_px=noise, rng=rng, tilt_noise=tilt_noise), out / "detections.json")
     save(scene, out / "truth.json")
-    click.echo(f"wrote      {out / 'detections.json'}, and {out / 'truth.json'}: camera, target and poses")
+    tell(f"wrote      {out / 'detections.json'}, and {out / 'truth.json'}: camera, target and poses")
     if rendered:
         folder = write_photographs(scene, out / "photographs", seed=seed)
-        click.echo(f"wrote      {views} photographs into {folder}/")
+        tell(f"wrote      {views} photographs into {folder}/")
 
 
 def _camera(
