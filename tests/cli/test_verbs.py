@@ -241,3 +241,15 @@ def test_demo_finds_the_camera_it_rendered_with(run, tmp_path):
     assert (tmp_path / "report.html").stat().st_size > 100_000
     truth, found = load_own_camera(tmp_path / "truth.json"), load_own_camera(tmp_path / "calibration.json")
     assert np.nanmean(np.abs(image_difference(truth, found, frame_grid(truth.image_size)))) < 0.1
+
+
+def test_a_photograph_left_out_by_name_stays_in_the_corners_and_out_of_the_camera(run, calibrated, tmp_path):
+    found = ("calibrate", calibrated / "detections.json", "--method", "fccm", "--no-report", "-o", tmp_path)
+    assert run(*found, "--without", "view02.png", "--without", "view05.png").code == 0
+    assert len(load_detections(tmp_path / "detections.json").views) == 10
+    used = load(tmp_path / "calibration.json").detections
+    assert len(used.views) == 8
+    assert [entry.image for entry in used.set_aside] == ["view02.png", "view05.png"]
+    told = run(*found, "--without", "view99.png")
+    assert told.code == 2
+    assert "view01.png" in told.err

@@ -10,9 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.bent_boards import bowed, drawn, photographed_with
 from helpers.scenes import NARROW
-from orthoscope.fitting.board_order import in_one_order, turns_of
+from orthoscope.fitting.board_order import in_one_order, listed_as_known, turns_of
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm, fit_flat
+from orthoscope.models.target_shape import TargetShape, without_similarity
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import Target, chessboard
 
@@ -73,6 +74,20 @@ def test_what_turned_views_give_is_what_consistent_ones_give():
     expected = decoupled(right, **settings)
     assert found.rms_px == pytest.approx(expected.rms_px, rel=1e-4)
     assert found.target_shape.rms == pytest.approx(expected.target_shape.rms, rel=1e-3)
+
+
+def test_a_view_that_is_foreseen_is_listed_as_the_known_shape_is():
+    target = ALIKE["half a turn"]
+    right = photographed_with(shape_of(target), NARROW, 6, target=target, noise_px=0.1, seed=2)
+    known = TargetShape("free", without_similarity(target.points, shape_of(target), np.ones(48, dtype=bool)))
+    wrong = listed_from_elsewhere(right, {1: 1, 4: 1})
+    for view, as_it_was, as_it_came in zip(
+        listed_as_known(NARROW, wrong, known).views, right.views, wrong.views, strict=True
+    ):
+        assert_array_equal(view.pixels, as_it_came.pixels)  # row by row
+        order = np.argsort(view.ids)
+        assert_array_equal(view.pixels[order], as_it_was.pixels)
+    assert listed_as_known(NARROW, wrong, TargetShape.flat(48)) is wrong
 
 
 @for_every_alike

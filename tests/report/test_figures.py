@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,11 @@ from matplotlib.quiver import Quiver
 from numpy.testing import assert_allclose
 
 from orthoscope.evaluation.misfit.misfit import misfit
+from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.cells import Cells, cells_for
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import LENSES, Brown, KannalaBrandt
+from orthoscope.report import plates
 from orthoscope.report.data.lens_curve import along_angles
 from orthoscope.report.figures import (
     lens_difference,
@@ -30,6 +33,7 @@ from orthoscope.report.figures import (
 from orthoscope.report.figures.lens import distortion_curve
 from orthoscope.report.figures.style import RED, named
 from orthoscope.report.plates import PLATES
+from orthoscope.report.print_files import check_matplotlib, write_figures
 from orthoscope.targets.detections import Detections
 
 KINDS = (
@@ -200,3 +204,20 @@ def test_a_name_is_no_formula_and_has_nothing_unseen():
     axes = figure.add_subplot()
     axes.set_title(named("$\\frac{a}$\x1b\n.png"))
     assert r"$\frac{a}$\x1b\n.png" in to_svg(figure, "f")
+
+
+def test_figures_for_a_paper_are_written_as_svg_and_pdf_the_same_every_time(ordinary, tmp_path, monkeypatch):
+    monkeypatch.setattr(plates, "PLATES", plates.PLATES[:1])
+    for folder in ("a", "b"):
+        written = write_figures(ordinary, tmp_path / folder)
+        assert [path.name for path in written] == ["by-view.svg", "by-view.pdf"]
+    assert (tmp_path / "a/by-view.svg").read_text().startswith("<svg")
+    assert (tmp_path / "a/by-view.pdf").read_bytes().startswith(b"%PDF")
+    for name in ("by-view.svg", "by-view.pdf"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_without_matplotlib_one_is_told_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(InputError, match=r"pip install 'orthoscope\[figures\]'"):
+        check_matplotlib()

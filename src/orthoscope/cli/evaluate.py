@@ -89,7 +89,8 @@ def evaluate(
             tell(*evaluation_lines(evaluation, verbose=verbose))
         return
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
-        board = target or loaded.detections.target  # type: ignore[union-attr]  # a calibration, as checked above
+        own = loaded.detections.target if isinstance(loaded, Calibration) else None
+        board = target or own  # a camera alone comes with a target, as checked above
         detections, _ = detections_from(
             others, board, image_size=image_size, executor=executor, progress=progress
         )

@@ -69,7 +69,9 @@ def paper(
         from orthoscope.files.whole_files import check_folder, write_text
         from orthoscope.paper.documents import documents
         from orthoscope.paper.section4 import Plan, run
+        from orthoscope.report.print_files import check_matplotlib
 
+        check_matplotlib()
         check_folder(out)
         plan = Plan.quick(trials=trials or 2, seed=seed) if quick else Plan(trials=trials or 25, seed=seed)
         detections, files = None, {}

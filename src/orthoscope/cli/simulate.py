@@ -82,6 +82,13 @@ Examples:
 )
 @click.option("--partial", is_flag=True, help="Let the target leave the frame.")
 @click.option("--render", "rendered", is_flag=True, help="Also render the photographs, into OUT/photographs.")
+@click.option(
+    "--paper",
+    "papers",
+    type=click.Choice(("low", "high")),
+    help="Instead of all these but --noise and --seed: the paper's section 4.1 with low or high distortion, 15 views to"
+    " compute in OUT/training.json and 5 to test in OUT/test.json; the first trial of `orthoscope paper`.",
+)
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of all that is random.")
 @click.option(
     "-o",
@@ -104,6 +111,7 @@ def simulate(
     fill: tuple[float, float],
     partial: bool,
     rendered: bool,
+    papers: str | None,
     seed: int,
     out: Path,
 ) -> None:
@@ -116,6 +124,9 @@ def simulate(
     from orthoscope.targets.table import parse_target
 
     check_folder(out)
+    if papers:
+        _write_papers(papers, noise, seed, out)
+        return
     rng = np.random.default_rng(seed)
     camera, board = _camera(source, lens, image_size, focal), parse_target(target)
     margin = _square(board) if rendered else 0.0  # the outer squares are to be in the picture too
@@ -136,6 +147,24 @@ def simulate(
     if rendered:
         folder = write_photographs(scene, out / "photographs", seed=seed)
         tell(f"wrote      {views} photographs into {folder}/")
+
+
+def _write_papers(distortion: str, noise: float, seed: int, out: Path) -> None:
+    """The paper's own corners, for other people's code to run on."""
+    from orthoscope.formats.own.json import save
+    from orthoscope.paper.trials import Condition, papers_scene, simulated
+
+    training, test = simulated(distortion, Condition(noise), seed=seed, trial=0)
+    for thing, name in (
+        (training, "training"),
+        (test, "test"),
+        (papers_scene(distortion, seed=seed, trial=0), "truth"),
+    ):
+        save(thing, out / f"{name}.json")
+    tell(
+        f"wrote      {out / 'training.json'}, {out / 'test.json'}, and {out / 'truth.json'}: camera, target,"
+        " poses"
+    )
 
 
 def _camera(

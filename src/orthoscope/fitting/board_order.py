@@ -19,20 +19,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.resection import resect
 from orthoscope.fitting.residual_slopes import residual_slopes
-from orthoscope.geometry.arrays import Float, Int, ndarray
-from orthoscope.geometry.pose import Pose
-from orthoscope.models.target_shape import polynomials
-from orthoscope.targets.detections import Target, View
+from orthoscope.geometry.arrays import CalibrationError, Float, Int, ndarray
+from orthoscope.geometry.pose import Pose, nearest_rotation
+from orthoscope.models.camera import Camera
+from orthoscope.models.target_shape import TargetShape, polynomials
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target
 
-__all__ = ["Turn", "in_one_order", "turns_of"]
+__all__ = ["Turn", "in_one_order", "listed_as_known", "turns_of"]
 
 FEWEST = 3  # views: of two, either may be the one that is turned
 LIKELY = 1e-3  # of the target's size: the standard deviation of a smooth shape's coefficients
 SURE = 10.0  # times the noise's variance, for each view that is turned: chance gives no such gain
 ROUNDS = 20
+SAME = 1e-6  # of the target's size: points nearer than this are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +53,24 @@ class Turn:
 
 
 def turns_of(target: Target) -> list[Turn]:
-    """The turns that a detector cannot tell from none, the turn by nothing first.
+    """The turns that a detector may not tell from none, the turn by nothing first.
 
-    A chessboard's two colours change places unless both of its counts are odd, or both even.
+    What a board says of itself, and the quarters of a square one: their colours change places where its
+    counts are odd, but not every detector looks at colours.
     """
-    found = [Turn(np.eye(3), np.arange(len(target.points)))]
-    if target.grid is None or sum(target.grid) % 2:
-        return found
-    columns, rows = target.grid
-    ids = np.arange(rows * columns).reshape(rows, columns)
-    for quarters in (1, 2, 3) if rows == columns else (2,):
-        cos, sin = round(np.cos(0.5 * np.pi * quarters)), round(np.sin(0.5 * np.pi * quarters))
-        rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        corners = np.empty(rows * columns, dtype=np.int64)
-        corners[ids.ravel()] = np.rot90(ids, quarters).ravel()
-        found.append(Turn(rotation, corners))
-    return found
+    points = target.points - target.points.mean(0)
+    known = [np.arange(len(points)), *(target.board.symmetries() if target.board else ())]
+    if target.grid and target.grid[0] == target.grid[1]:
+        ids = np.arange(len(points)).reshape(target.grid)
+        known += [np.rot90(ids, quarters).ravel() for quarters in (1, 2, 3)]
+    distinct = {corners.tobytes(): corners for corners in known}
+    found = [Turn(nearest_rotation(points[corners].T @ points), corners) for corners in distinct.values()]
+    return [turn for turn in found if _fits(turn, points)]
+
+
+def _fits(turn: Turn, points: Float[ndarray, "p 3"]) -> bool:
+    """Whether the turn brings every point to where another is."""
+    return bool(np.abs(points @ turn.rotation.T - points[turn.corners]).max() < SAME * np.ptp(points[:, :2]))
 
 
 def in_one_order(flat: Calibration) -> Calibration:
@@ -96,6 +102,34 @@ def in_one_order(flat: Calibration) -> Calibration:
     return replace(flat, detections=detections, camera_from_target=tuple(poses))
 
 
+def listed_as_known(camera: Camera, detections: Detections, shape: TargetShape | None) -> Detections:
+    """The detections, corners listed from the end of the target that a known shape was learnt from: of each
+    view the turn with which it is seen best. Rows keep their order; a view that some turn cannot be fitted
+    for is left as it is.
+
+    Args:
+        camera: that took them.
+        shape: of the target.
+    """
+    turns = turns_of(detections.target)
+    if len(turns) < 2 or shape is None or not shape.displacements.any():
+        return detections
+    views = []
+    for view in detections.views:
+        listed = [replace(view, ids=turn.corners[view.ids]) for turn in turns]
+        views.append(min(listed, key=lambda one: _misses(camera, replace(detections, views=(one,)), shape)))
+    return replace(detections, views=tuple(views))
+
+
+def _misses(camera: Camera, alone: Detections, shape: TargetShape) -> float:
+    """The sum of squared residuals of one view; infinite where it has no pose."""
+    try:
+        poses = resect(camera, alone, shape=shape)
+    except CalibrationError:
+        return np.inf
+    return float((residuals_of(camera, poses, alone, shape=shape)[0] ** 2).sum())
+
+
 @dataclass(frozen=True, eq=False)
 class _Sums:
     """The normal equations of each view under each turn: gram (m,g,c,c), right (m,g,c); prior (c,c); square:
@@ -109,6 +143,7 @@ class _Sums:
     square: float
     freedom: int
     named: int
+    after: ndarray
 
     @classmethod
     def of(cls, flat: Calibration, turns: list[Turn]) -> _Sums:
@@ -134,7 +169,7 @@ class _Sums:
         size = float(np.ptp(points[:, :2], axis=0).max())
         precision = square / max(freedom, 1) / (LIKELY * size) ** 2
         prior = np.diag(np.concatenate([1e-9 * np.diag(gram[:, 0].sum(0))[:k], np.full(3 * r, precision)]))
-        return cls(gram, right, prior, square, freedom, k)
+        return cls(gram, right, prior, square, freedom, k, _after(turns))
 
     def shape(self, turns: Int[ndarray, " m"], views: Int[ndarray, " v"]) -> Float[ndarray, " c"]:
         """Camera and shape that some views tell together, each turned as said."""
@@ -166,7 +201,7 @@ class _Sums:
 
 def _chosen(sums: _Sums) -> Int[ndarray, " m"]:
     """The turn of each view, 0 where it stays; all 0 where no turns are surely better."""
-    m, turns = sums.gram.shape[:2]
+    m = len(sums.gram)
     none = np.zeros(m, dtype=np.int64)
     before, _ = sums.total(none)
     best, cost = none, before
@@ -181,18 +216,22 @@ def _chosen(sums: _Sums) -> Int[ndarray, " m"]:
         total, _ = sums.total(tried)
         if total < cost - 1e-9 * sums.square:
             best, cost = tried, total
-    best = _least_turned(best, turns)
+    best = _least_turned(best, sums.after)
     noise = max(sums.square + cost, 1e-12 * sums.square) / max(sums.freedom, 1)
     needed = SURE * noise * sums.likeness(best, sums.total(best)[1], noise) * max(int((best > 0).sum()), 1)
     return best if before - cost > needed else none
 
 
-def _least_turned(chosen: Int[ndarray, " m"], turns: int) -> Int[ndarray, " m"]:
+def _least_turned(chosen: Int[ndarray, " m"], after: Int[ndarray, "g g"]) -> Int[ndarray, " m"]:
     """The same order of all views against each other, with as few of them turned as can be."""
-    quarters = {1: 1, 2: 2, 4: 4}[turns]
-    return min(
-        ((chosen - shift) % quarters for shift in range(quarters)), key=lambda some: int((some > 0).sum())
-    )
+    return min((seen_from[chosen] for seen_from in after), key=lambda some: int((some > 0).sum()))
+
+
+def _after(turns: list[Turn]) -> Int[ndarray, "g g"]:
+    """after[s, t]: what turn t is when the target is looked at as turn s shows it."""
+    number = {turn.corners.tobytes(): i for i, turn in enumerate(turns)}
+    back = [np.argsort(turn.corners) for turn in turns]
+    return np.array([[number[back[s][turn.corners].tobytes()] for turn in turns] for s in range(len(turns))])
 
 
 def _without(basis: Float[ndarray, "m n 6"], columns: Float[ndarray, "m n c"]) -> Float[ndarray, "m n c"]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orthoscope.fitting.board_order import listed_as_known
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, Int, ndarray
@@ -137,6 +138,7 @@ def _fold(
     tested = detections.only(part)
     try:
         known = refit(detections.only(others))
+        tested = listed_as_known(known.camera, tested, known.target_shape)
         poses = resect(known.camera, tested, shape=known.target_shape)
     except CalibrationError:
         return None

@@ -7,6 +7,7 @@ takes one method.
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import inspect
 from collections import UserDict
 from collections.abc import Callable, Mapping, Sequence
@@ -31,7 +32,8 @@ class _Methods(UserDict[str, Any]):
 
     def __getitem__(self, name: str) -> Callable[..., Calibration]:
         if isinstance(self.data[name], str):
-            self.data[name] = getattr(importlib.import_module(self.data[name]), name)
+            module, _, attribute = self.data[name].partition(":")
+            self.data[name] = getattr(importlib.import_module(module), attribute or name)
         return self.data[name]
 
 
@@ -43,6 +45,20 @@ METHODS = _Methods(
         "nmldc": f"{__name__}.mldc.nmldc",
     }
 )
+
+
+def _of_others() -> dict[str, str]:
+    """Methods of other packages: entry points of the group `orthoscope.methods`, `name =
+    "package.module:name"`.
+
+    They are functions like these here; where the attribute has another name than the entry, it is the entry's
+    that counts.
+    """
+    found = importlib.metadata.entry_points(group="orthoscope.methods")
+    return {entry.name: entry.value for entry in found if entry.name not in METHODS.data}
+
+
+METHODS.data.update(_of_others())
 
 
 @with_one_thread
@@ -69,11 +85,14 @@ def check_settings(method: str, settings: Mapping[str, Any]) -> None:
     known = settings_of(method)
     if unknown := sorted(set(settings) - set(known)):
         raise InputError(f"method {method!r} has no setting {unknown[0]!r}; it has {', '.join(known)}.")
-    kinds = get_type_hints(METHODS[method])
+    try:
+        kinds = get_type_hints(METHODS[method])
+    except NameError:  # a method of another package, with annotations that only its type checker resolves
+        return
     for name, value in settings.items():
-        if _is_misfit(value, kinds[name]):
+        if _is_misfit(value, kinds.get(name)):
             raise InputError(
-                f"setting {name!r} of method {method!r} is {value!r}; expected {_told(kinds[name])}."
+                f"setting {name!r} of method {method!r} is {value!r}; expected {_told(kinds.get(name))}."
             )
 
 

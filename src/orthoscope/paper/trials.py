@@ -30,7 +30,7 @@ from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.paper.entries import PaperEntry
 from orthoscope.paper.subgrids import on_subgrid
-from orthoscope.simulation.scene import paper_scene, simulate_detections
+from orthoscope.simulation.scene import Scene, paper_scene, simulate_detections
 from orthoscope.targets.detections import Detections
 
 __all__ = [
@@ -41,6 +41,7 @@ __all__ = [
     "Outcome",
     "Study",
     "Trial",
+    "papers_scene",
     "simulated",
     "simulated_trial",
     "trial_judged",
@@ -170,10 +171,8 @@ def simulated_trial(scene: str, condition: Condition, *, seed: int, trial: int) 
 
     The random numbers are those of SeedSequence(seed).spawn's child `trial`, whoever asks first.
     """
-    views, noise, of_test = (
-        np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial, part))) for part in range(3)
-    )
-    truth = paper_scene(scene, count=TRAINING_VIEWS + TEST_VIEWS, rng=views)
+    noise, of_test = (_random(seed, trial, part) for part in (1, 2))
+    truth = papers_scene(scene, seed=seed, trial=trial)
     training, test = (
         replace(truth, camera_from_target=truth.camera_from_target[part])
         for part in (slice(TRAINING_VIEWS), slice(TRAINING_VIEWS, TRAINING_VIEWS + TEST_VIEWS))
@@ -183,6 +182,16 @@ def simulated_trial(scene: str, condition: Condition, *, seed: int, trial: int) 
     exact = simulate_detections(test, noise_px=0.0, rng=noise)
     noisy = simulate_detections(test, noise_px=condition.noise_px, rng=of_test, tilt_noise=True)
     return Trial(thinned, exact, noisy if condition.noise_px else exact, test.camera_from_target)
+
+
+def papers_scene(scene: str, *, seed: int, trial: int) -> Scene:
+    """The camera, the target and all poses of a trial, those to compute from first."""
+    return paper_scene(scene, count=TRAINING_VIEWS + TEST_VIEWS, rng=_random(seed, trial, 0))
+
+
+def _random(seed: int, trial: int, part: int) -> np.random.Generator:
+    """The random numbers of views (0), of noise (1) and of noise on test views (2)."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial, part)))
 
 
 def trial_outcomes(study: Study, scene: str, *, seed: int, trial: int) -> list[Outcome]:

@@ -28,5 +28,13 @@ const FIGURES = {
   displacement: () => field("displacement", "px"),
   difference: () => field("difference", "px"),
 };
-for (const [name, draw] of Object.entries(FIGURES)) if (panels[name] && document.getElementById(name)) draw();
+/* one after the other, so that the first is seen before the last is thought of */
+const waiting = Object.keys(FIGURES).filter(name => panels[name] && document.getElementById(name));
+const drawNext = () => {
+  const name = waiting.shift();
+  if (!name) return;
+  FIGURES[name]();
+  setTimeout(drawNext);
+};
 themed(false);
+drawNext();

@@ -225,7 +225,7 @@ class Plot {
     this.paint(this);
     g.restore();
     if (this.after) this.after(this);
-    this.canvas.dataset.drawn = "yes";
+    this.canvas.dataset.drawn = Math.round(performance.now());
   }
   axes() {
     if (!this.labels) return;
