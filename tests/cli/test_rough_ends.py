@@ -9,12 +9,15 @@ import sys
 import threading
 import time
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from orthoscope.cli.executors import threads
+from orthoscope.formats.export import export
 from orthoscope.formats.own.json import save
+from orthoscope.models.camera import Intrinsics
 from orthoscope.simulation.scene import simulate_detections
 from orthoscope.targets.detections import Detections, SetAside
 
@@ -118,3 +121,22 @@ def test_a_killed_worker_and_want_of_memory_leave_with_1(run, monkeypatch, error
     assert told.code == 1
     assert words in told.err
     assert told.err.count("\n") == 1
+
+
+def test_comparing_a_camera_of_a_file_says_how_that_is_done(run, tmp_path):
+    told = run("compare", tmp_path, "--with", "camera_info.yaml", "-o", tmp_path / "out")
+    assert told.code == 2
+    assert "orthoscope evaluate camera_info.yaml --on PHOTOS" in told.err
+
+
+def test_another_programs_camera_has_a_verdict_on_photographs(run, scene, tmp_path):
+    save(simulate_detections(scene, noise_px=0.1, rng=np.random.default_rng(0)), tmp_path / "corners.json")
+    for focal, verdict in ((1.0, "Good: off by about 0.1"), (1.5, "Do not use this camera: off by about ")):
+        camera = replace(scene.camera, intrinsics=Intrinsics(520.0 * focal, 518.0 / focal, 324.0, 236.0))
+        export(camera, tmp_path / "camera.yaml", "opencv")
+        told = run(
+            *("evaluate", tmp_path / "camera.yaml", "--on", tmp_path / "corners.json"),
+            *("--target", "chessboard:9x6:25mm"),
+        )
+        assert told.code == 0, told.err
+        assert told.out.startswith(f"verdict    {verdict}")

@@ -19,6 +19,7 @@ EXAMPLE = """\b
 Examples:
   $ orthoscope evaluate camera/calibration.json
   $ orthoscope evaluate camera/calibration.json --on other_photos/
+  verdict    Good: off by about 0.16 px where these photographs have corners.
   off by     0.158 px per corner, the camera fixed, poses fitted
   photos     5 used, 0 set aside; 270 corners
   board      the one of the calibration: 0.158 px with the shape found there, 0.241 without; the shape found
@@ -66,6 +67,7 @@ def evaluate(
     from orthoscope.cli.summary import evaluation_lines, to_json
     from orthoscope.evaluation.evaluate import evaluate_on
     from orthoscope.evaluation.same_board import same_board
+    from orthoscope.evaluation.verdict.verdict import far_on_others
     from orthoscope.fitting.calibration import Calibration
     from orthoscope.formats.load import load_source
     from orthoscope.formats.own.json import text_of
@@ -100,6 +102,7 @@ def evaluate(
         board = same_board(loaded.camera, loaded.target_shape, test.detections)
         if board.same:
             test = evaluate_on(loaded.camera, detections, shape=loaded.target_shape)
+    verdict = far_on_others(test.rms_px, loaded.camera.image_size)
     if as_json:
         rejected = [{"name": entry.image, "reason": entry.reason} for entry in test.detections.set_aside]
         views = [
@@ -107,6 +110,7 @@ def evaluate(
             for view, rms in zip(test.detections.views, test.view_rms_px, strict=True)
         ]
         numbers = {
+            "verdict": verdict,
             "rms_px": test.rms_px,
             "nce": test.nce,
             "corners": test.detections.corners,
@@ -116,6 +120,7 @@ def evaluate(
         }
         tell_json(to_json(numbers))
         return
+    tell(f"verdict    {verdict}")
     tell(f"off by     {test.rms_px:.3f} px per corner, the camera fixed, poses fitted")
     aside = test.detections.set_aside
     tell(
