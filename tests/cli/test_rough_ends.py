@@ -140,3 +140,13 @@ def test_another_programs_camera_has_a_verdict_on_photographs(run, scene, tmp_pa
         )
         assert told.code == 0, told.err
         assert told.out.startswith(f"verdict    {verdict}")
+
+
+def test_without_opencv_one_is_told_what_to_install(run, monkeypatch):
+    def fail() -> None:
+        raise ModuleNotFoundError("No module named 'cv2'", name="cv2")
+
+    monkeypatch.setattr(sys.modules["orthoscope.cli.export"], "tool_lines", fail)
+    told = run("tools")
+    assert told.code == 2
+    assert "pip install opencv-python-headless" in told.err

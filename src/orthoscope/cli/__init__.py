@@ -93,6 +93,14 @@ def main() -> None:
             f"orthoscope: what is printed or written finds no place ({error.strerror}); free some.", err=True
         )
         sys.exit(2)
+    except ImportError as error:
+        if error.name != "cv2":
+            raise
+        tell(
+            "orthoscope: photographs need OpenCV, which is not installed; say pip install opencv-python-headless.",
+            err=True,
+        )
+        sys.exit(2)
     except MemoryError:
         tell(
             "orthoscope: there is not enough memory for this; give it smaller pictures or --jobs 1.", err=True
