@@ -8,8 +8,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
+from PIL import Image
 
+from orthoscope.files.image_headers import without_turning
 from orthoscope.files.images import names_of, photographs, read_image, write_image
 from orthoscope.geometry.arrays import InputError
 
@@ -177,3 +181,20 @@ def test_a_name_without_a_format_is_refused_and_nothing_is_written(tmp_path):
     with pytest.raises(InputError, match="no image format"):
         write_image(tmp_path / "a.xyz", PICTURE)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("settings", [{}, {"big_tiff": True}], ids=["usual", "of more than 4 GB"])
+def test_a_tag_that_says_how_the_camera_was_held_turns_no_tiff_on_any_page(tmp_path, settings):
+    pages = [PICTURE[:24, :36], PICTURE[24:, :36]]
+    upright, *others = map(Image.fromarray, pages)
+    path = tmp_path / "held.tif"
+    upright.save(path, save_all=True, append_images=others, tiffinfo={274: 6}, **settings)
+    with Image.open(path) as image:
+        assert image.tag_v2[274] == 6  # pyright: ignore[reportAttributeAccessIssue]
+    for page, pixels in enumerate(pages):
+        assert_array_equal(read_image(path, grey=True, page=page), pixels)
+
+
+@given(st.binary(max_size=60), st.sampled_from([b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]))
+def test_a_damaged_tiff_is_followed_as_far_as_it_can_be(rest, opening):
+    assert len(without_turning(opening + rest)) == 4 + len(rest)

@@ -31,7 +31,7 @@ from orthoscope.report.figures import (
     to_svg,
 )
 from orthoscope.report.figures.lens import distortion_curve
-from orthoscope.report.figures.style import RED
+from orthoscope.report.figures.style import RED, named
 from orthoscope.report.plates import PLATES
 from orthoscope.report.print_files import check_matplotlib, write_figures
 from orthoscope.targets.detections import Detections
@@ -197,6 +197,13 @@ def test_cell_means_are_nan_where_nothing_fell():
 def test_cells_are_nearly_square_and_about_as_many_as_wanted(size):
     cells = cells_for(size, 100)
     assert 1 <= cells.columns * cells.rows <= 120
+
+
+def test_a_name_is_no_formula_and_has_nothing_unseen():
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.set_title(named("$\\frac{a}$\x1b\n.png"))
+    assert r"$\frac{a}$\x1b\n.png" in to_svg(figure, "f")
 
 
 def test_figures_for_a_paper_are_written_as_svg_and_pdf_the_same_every_time(ordinary, tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell, tell_json
 
 __all__ = ["calibrate", "calibrate_into"]
 
@@ -155,13 +156,9 @@ def calibrate_into(
     if undistort:
         written.append(_write_straight(evaluation, files, out, keep=keep, jobs=jobs, cluster=cluster))
     if as_json:
-        click.echo(text_of(evaluation), nl=False)
+        tell_json(text_of(evaluation))
     else:
-        click.echo(
-            "\n".join(
-                [*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written))]
-            )
-        )
+        tell(*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written)))
     return evaluation
 
 
@@ -181,7 +178,7 @@ def _write_for(tool: str, calibration: Any, out: Path) -> list[Path]:
 
     exported = export(calibration, out / f"camera-{tool}{FORMATS[tool].suffixes[0]}", tool, anyway=True)
     for remark in exported.remarks():
-        click.echo(f"{tool:<10} {remark}", err=True)
+        tell(f"{tool:<10} {remark}", err=True)
     return list(exported.files)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell, tell_json
 
 if TYPE_CHECKING:
     from orthoscope.evaluation.comparison.compare import Comparison
@@ -101,8 +102,10 @@ def compare(
     for name, text in texts.items():
         write_text(out / name, text)
     written = "wrote      " + ", ".join(str(out / name) for name in texts)
-    told = texts["comparison.json"] if as_json else "\n".join([*_lines(comparison), written]) + "\n"
-    click.echo(told, nl=False)
+    if as_json:
+        tell_json(texts["comparison.json"])
+    else:
+        tell(*_lines(comparison), written)
 
 
 def _lines(comparison: Comparison) -> list[str]:

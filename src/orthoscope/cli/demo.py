@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from orthoscope.cli.telling import tell
+
 __all__ = ["demo"]
 
 EXAMPLE = """\b
@@ -47,14 +49,12 @@ def demo(seed: int, out: Path) -> None:
     scene = demo_scene(seed=seed)
     folder = write_photographs(scene, out / "photographs", seed=seed)
     save(scene, out / "truth.json")
-    click.echo(
-        f"rendered   {len(scene.camera_from_target)} photographs of {scene.target.name} into {folder}/"
-    )
+    tell(f"rendered   {len(scene.camera_from_target)} photographs of {scene.target.name} into {folder}/")
     evaluation = calibrate_into((str(folder),), target=scene.target.name, out=out, lens="brown")
     apart = np.hypot(
         *image_difference(scene.camera, evaluation.calibration.camera, frame_grid(scene.camera.image_size)).T
     )
-    click.echo(
+    tell(
         f"truth      the recovered camera is {np.nanmean(apart):.3f} px from the true one on average over the"
         f" frame, {np.nanmax(apart):.3f} px at most"
     )

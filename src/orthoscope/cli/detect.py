@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell, tell_json
 
 __all__ = ["detect"]
 
@@ -40,7 +41,7 @@ Example:
 @options.as_json
 def detect(
     photos: tuple[str, ...],
-    target: str,
+    target: str | None,
     image_size: tuple[int, int] | None,
     jobs: int | None,
     max_megapixels: float | None,
@@ -69,12 +70,12 @@ def detect(
     width, height = detections.image_size
     used, aside = detections.views, detections.set_aside
     if as_json:
-        click.echo(text_of(detections), nl=False)
+        tell_json(text_of(detections))
         return
-    click.echo(
+    tell(
         f"views      {len(used)} of {len(used) + len(aside)} photographs, {detections.corners} corners,"
         f" {width}x{height}"
     )
     for entry in aside:
-        click.echo(f"           {entry.image}: {entry.reason}")
-    click.echo(f"wrote      {out}")
+        tell(f"           {entry.image}: {entry.reason}")
+    tell(f"wrote      {out}")

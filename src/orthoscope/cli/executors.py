@@ -2,22 +2,27 @@
 
 Each is a `concurrent.futures.Executor` that is handed down; what is left to do when a verb is stopped, by
 Ctrl-C or by SIGTERM, is dropped, and nobody stays behind: threads finish the photograph that they are at,
-processes go at once, even where their parent was killed.
+unless it keeps them for seconds, processes go at once, even where their parent was killed.
 """
 
 from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from typing import NoReturn
 
-__all__ = ["cluster", "processes", "single_threaded", "threads"]
+__all__ = ["cluster", "leave_threads", "processes", "single_threaded", "stopped_by_sigterm", "threads"]
 
 # These variables of the environment tell numpy's libraries how many threads to use.
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+# Threads that are stopped may finish what they are at within this time, seconds.
+PATIENCE = 3.0
 # A scheduler has to answer within this time, seconds.
 ANSWER_TIMEOUT = 10
 
@@ -65,7 +70,8 @@ def cluster(address: str) -> Iterator[Executor]:
     """The workers of a running Dask scheduler; one that dies has its work done by the others.
 
     Args:
-        address: of the scheduler, such as tcp://192.168.1.5:8786.
+        address: of the scheduler, such as tls://192.168.1.5:8786; whoever owns it runs code here, since
+            results come back as Python's pickles.
     Raises:
         InputError: `distributed` is not installed, or nobody answers.
     """
@@ -82,10 +88,10 @@ def cluster(address: str) -> Iterator[Executor]:
         client = Client(address, timeout=ANSWER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
-            f"no Dask scheduler answers at {address!r}; expected one such as tcp://192.168.1.5:8786. Start it"
+            f"no Dask scheduler answers at {address!r}; expected one such as tls://192.168.1.5:8786. Start it"
             " first."
         ) from error
-    with client, _stopped_by_sigterm():
+    with client, stopped_by_sigterm():
         executor = client.get_executor(pure=False)
         try:
             yield executor
@@ -117,17 +123,19 @@ def _here(executor: Executor, *, then: Callable[[], None] = lambda: None) -> Ite
         executor: the one.
         then: what is done after the dropping.
     """
-    with _stopped_by_sigterm(), executor:
+    with stopped_by_sigterm():
         try:
             yield executor
         except BaseException:
             executor.shutdown(wait=False, cancel_futures=True)
             then()
+            _wait_for_others()
             raise
+        executor.shutdown(wait=True)
 
 
 @contextmanager
-def _stopped_by_sigterm() -> Iterator[None]:
+def stopped_by_sigterm() -> Iterator[None]:
     """Lets SIGTERM stop the block as Ctrl-C does; only the main thread can say so."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -137,6 +145,28 @@ def _stopped_by_sigterm() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def leave_threads(code: int) -> NoReturn:
+    """Exit, also where a thread still waits, as for a file that does not come."""
+    _wait_for_others()
+    if _others():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
+
+
+def _others() -> list[threading.Thread]:
+    """Threads that Python would wait for."""
+    return [one for one in threading.enumerate() if one is not threading.current_thread() and not one.daemon]
+
+
+def _wait_for_others() -> None:
+    """Let threads finish what they are at, for a while."""
+    end = time.monotonic() + PATIENCE
+    for thread in _others():
+        thread.join(max(0.0, end - time.monotonic()))
 
 
 def _serve() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell
 
 __all__ = ["convert", "export"]
 
@@ -82,7 +83,7 @@ def convert(source: str, out: Path, tool: str, **settings: Any) -> None:
 @click.command(epilog=TOOLS_EXAMPLE)
 def tools() -> None:
     """List the tools whose cameras are read and written."""
-    click.echo("\n".join(tool_lines()))
+    tell(*tool_lines())
 
 
 def tool_lines() -> list[str]:
@@ -119,5 +120,5 @@ def write_for(
         loaded = options.camera_at_another_size(getattr(loaded, "camera", loaded), crop, binning, resize)
     exported = write(loaded, out, tool, name=name, anyway=anyway)
     for remark in exported.remarks():
-        click.echo(f"lens       {remark}")
-    click.echo(f"wrote      {', '.join(map(str, exported.files))}")
+        tell(f"lens       {remark}")
+    tell(f"wrote      {', '.join(map(str, exported.files))}")

@@ -9,8 +9,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 
-import click
-
+from orthoscope.cli.telling import tell
 from orthoscope.formats.corners_vnl import read_vnl
 from orthoscope.formats.own.json import load_detections
 from orthoscope.geometry.arrays import InputError
@@ -60,5 +59,5 @@ def detections_from(
     most = MOST_MEGAPIXELS if most_megapixels is None else most_megapixels
     found = detect(files, target, jobs=jobs, executor=executor, progress=progress, most_megapixels=most)
     if others := passed_over(paths, also=FILMS):
-        click.echo(f"passed over {', '.join(f'{count} {end}' for end, count in others.items())}", err=True)
+        tell(f"passed over {', '.join(f'{count} {end}' for end, count in others.items())}", err=True)
     return found, dict(zip(names_of(files), files, strict=True))

@@ -231,8 +231,8 @@ cluster: Decorator = click.option(
     "--cluster",
     metavar="ADDRESS",
     help=(
-        "Instead of --jobs: the Dask scheduler, such as tcp://192.168.1.5:8786, whose workers see the same"
-        " files (pip install 'orthoscope[cluster]')."
+        "Instead of --jobs: the Dask scheduler, such as tls://192.168.1.5:8786, whose workers see the same"
+        " files (pip install 'orthoscope[cluster]'). Whoever owns that address runs code here."
     ),
 )
 keep: Decorator = click.option(

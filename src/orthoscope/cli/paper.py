@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell
 
 __all__ = ["paper"]
 
@@ -86,5 +87,5 @@ def paper(
         written = documents(results, files)
         for name, text in written.texts.items():
             write_text(out / name, text)
-    click.echo(written.headline)
-    click.echo(f"wrote      {out / written.page} and {len(written.texts) - 1} CSV files")
+    tell(written.headline)
+    tell(f"wrote      {out / written.page} and {len(written.texts) - 1} CSV files")

@@ -21,11 +21,13 @@ def bar(title: str) -> Iterator[Callable[..., None]]:
         return
     from tqdm import tqdm
 
+    from orthoscope.files.printable import printable
+
     with tqdm(desc=title, file=sys.stderr, leave=False) as drawn:
 
         def show(done: int, total: int, *name: str) -> None:
             drawn.total = total
-            drawn.set_postfix_str(name[0] if name else "", refresh=False)
+            drawn.set_postfix_str(printable(name[0]) if name else "", refresh=False)
             drawn.update(done - drawn.n)
 
         yield show

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell
 
 __all__ = ["report"]
 
@@ -78,4 +79,4 @@ def report(
         pictures = pictures_of(evaluation.calibration, files, keep=keep, executor=executor, progress=progress)
     write_report(evaluation, out, pictures=pictures)
     drawn = write_figures(evaluation, figures) if figures else []
-    click.echo(f"wrote      {out}" + (f", {len(drawn)} figures into {figures}/" if drawn else ""))
+    tell(f"wrote      {out}" + (f", {len(drawn)} figures into {figures}/" if drawn else ""))

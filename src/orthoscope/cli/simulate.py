@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell
 
 if TYPE_CHECKING:
     from orthoscope.models.camera import Camera
@@ -142,10 +143,10 @@ def simulate(
     scene = Scene(camera, board, poses)
     save(simulate_detections(scene, noise_px=noise, rng=rng, tilt_noise=tilt_noise), out / "detections.json")
     save(scene, out / "truth.json")
-    click.echo(f"wrote      {out / 'detections.json'}, and {out / 'truth.json'}: camera, target and poses")
+    tell(f"wrote      {out / 'detections.json'}, and {out / 'truth.json'}: camera, target and poses")
     if rendered:
         folder = write_photographs(scene, out / "photographs", seed=seed)
-        click.echo(f"wrote      {views} photographs into {folder}/")
+        tell(f"wrote      {views} photographs into {folder}/")
 
 
 def _write_papers(distortion: str, noise: float, seed: int, out: Path) -> None:
@@ -160,7 +161,7 @@ def _write_papers(distortion: str, noise: float, seed: int, out: Path) -> None:
         (papers_scene(distortion, seed=seed, trial=0), "truth"),
     ):
         save(thing, out / f"{name}.json")
-    click.echo(
+    tell(
         f"wrote      {out / 'training.json'}, {out / 'test.json'}, and {out / 'truth.json'}: camera, target,"
         " poses"
     )

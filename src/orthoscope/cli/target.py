@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from orthoscope.cli.telling import tell
+
 __all__ = ["target"]
 
 EXAMPLE = """\b
@@ -45,5 +47,5 @@ def target(spec: str, out: Path, paper: str | None) -> None:
     drawn = parse_target(spec)
     page = page_of(drawn, paper=paper)
     write_bytes(out, PRINT_FORMATS[out.suffix.lower()](page))
-    click.echo(f"board      {drawn.name} on paper of {page.width:g} x {page.height:g} mm")
-    click.echo(f"wrote      {out}: print it at 100 %, then measure the ruler")
+    tell(f"board      {drawn.name} on paper of {page.width:g} x {page.height:g} mm")
+    tell(f"wrote      {out}: print it at 100 %, then measure the ruler")

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.telling import tell, tell_json
 
 __all__ = ["straighten", "undistort"]
 
@@ -101,15 +102,15 @@ def undistort(
         made = [str(path) for path in (*frames, *written)]
         numbers = camera_numbers(view) if isinstance(view, Camera) else None
         removed = [str(path) for path in gone]
-        click.echo(to_json({"written": made, "rejected": rejected, "removed": removed, "camera": numbers}))
+        tell_json(to_json({"written": made, "rejected": rejected, "removed": removed, "camera": numbers}))
         return
     if gone:
-        click.echo(f"removed    {len(gone)} files of an earlier run that this one does not write", err=True)
+        tell(f"removed    {len(gone)} files of an earlier run that this one does not write", err=True)
     if (share := share_kept(loaded, view)) < 1.0 and keep == "all":
-        click.echo(f"shows      {100 * share:.3g} % of what was photographed ({projection})", err=True)
+        tell(f"shows      {100 * share:.3g} % of what was photographed ({projection})", err=True)
     made = [f"{film}, {count} frames" for film, count in frames.items()]
     made += [f"{len(written)} pictures into {out}/"] if written else []
-    click.echo(f"wrote      {'; '.join(made)}" + (f", and {beside[0]}, their camera" if beside else ""))
+    tell(f"wrote      {'; '.join(made)}" + (f", and {beside[0]}, their camera" if beside else ""))
 
 
 def write_beside(camera: Any, view: Any, out: Path, *, maps: bool) -> list[Path]:
@@ -151,7 +152,7 @@ def straighten_films(
             "two films have the same name; straighten them into folders of their own, one after the other."
         )
     if paths and not has_pyav():
-        click.echo("films      are written without sound; pip install 'orthoscope[video]' keeps it", err=True)
+        tell("films      are written without sound; pip install 'orthoscope[video]' keeps it", err=True)
     frames = {}
     for place, path in places.items():
         with threads(jobs) as executor, bar("straightening") as progress:
@@ -177,7 +178,7 @@ def straighten(
             paths, camera, out, view=view, executor=executor, progress=progress
         )
     for name, reason in failed:
-        click.echo(f"left out   {name}: {reason}", err=True)
+        tell(f"left out   {name}: {reason}", err=True)
     if not written:
         raise InputError(f"none of {len(paths)} photographs could be straightened; {failed[0][1]}")
     return written, failed

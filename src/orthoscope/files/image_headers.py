@@ -1,13 +1,23 @@
-"""How large a picture is, by its file's first bytes: asked before memory is taken for it."""
+"""What a picture's file says before its pixels: how large it is, asked before memory is taken for it, and
+how the camera was held.
+"""
 
 from __future__ import annotations
 
 import struct
 
-__all__ = ["size_in_header"]
+__all__ = ["size_in_header", "without_turning"]
 
 START_OF_FRAME = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})  # markers of a JPEG that hold its size
-TIFF_WIDTH, TIFF_HEIGHT = 256, 257  # tags
+TIFF_WIDTH, TIFF_HEIGHT, TIFF_ORIENTATION = 256, 257, 274  # tags
+# How a TIFF begins, also one beyond 4 GB: byte order, and how a place, a count of tags and a tag are written.
+TIFF_FORMS = {
+    b"II*\0": ("<", "I", "H", "HHI4x"),
+    b"MM\0*": (">", "I", "H", "HHI4x"),
+    b"II+\0": ("<", "Q", "Q", "HHQ8x"),
+    b"MM\0+": (">", "Q", "Q", "HHQ8x"),
+}
+SHORT = 3  # the kind of a tag's value that has two bytes
 
 
 def size_in_header(content: bytes) -> tuple[int, int] | None:
@@ -53,3 +63,30 @@ def _of_tiff(content: bytes) -> tuple[int, int] | None:
                 order + ("H" if kind == 3 else "I"), entry[8 : 10 if kind == 3 else 12]
             )[0]
     return (sides[TIFF_WIDTH], sides[TIFF_HEIGHT]) if len(sides) == 2 else None
+
+
+def without_turning(content: bytes) -> bytes:
+    """A picture's file that OpenCV reads as the sensor saw it: a TIFF's orientation tags become `upright`.
+
+    OpenCV turns TIFFs by that tag whatever it is told. Only the tags' own bytes change; a file that is no
+    TIFF is given back as it is, a damaged one is mended as far as it can be followed.
+    """
+    if content[:4] not in TIFF_FORMS:
+        return content
+    order, place_form, count_form, tag_form = TIFF_FORMS[content[:4]]
+    mended, seen = bytearray(content), set()
+    size = struct.calcsize(order + tag_form)
+    try:
+        (table,) = struct.unpack_from(order + place_form, content, 8 if place_form == "Q" else 4)
+        while table and table not in seen:
+            seen.add(table)
+            (count,) = struct.unpack_from(order + count_form, content, table)
+            first = table + struct.calcsize(order + count_form)
+            for entry in range(first, min(first + count * size, len(content) - size + 1), size):
+                if struct.unpack_from(order + "H", content, entry)[0] == TIFF_ORIENTATION:
+                    value = struct.pack(order + tag_form[:3] + "H", TIFF_ORIENTATION, SHORT, 1, 1)
+                    mended[entry : entry + size] = value.ljust(size, b"\0")
+            (table,) = struct.unpack_from(order + place_form, content, first + count * size)
+    except (struct.error, OverflowError):
+        pass  # OpenCV then says what is wrong with it
+    return bytes(mended)

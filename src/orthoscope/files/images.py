@@ -22,7 +22,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from orthoscope.files.image_headers import size_in_header
+from orthoscope.files.image_headers import size_in_header, without_turning
 from orthoscope.files.whole_files import read_bytes, write_bytes
 from orthoscope.geometry.arrays import InputError, ndarray
 
@@ -113,7 +113,7 @@ def read_image(
     Raises:
         InputError: the file is missing, empty, no image, cut off or too large.
     """
-    content = _content(Path(path), most_megapixels)
+    content = without_turning(_content(Path(path), most_megapixels))
     flags = (cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) | cv2.IMREAD_ANYDEPTH
     flags |= cv2.IMREAD_IGNORE_ORIENTATION
     with _QUIET:

@@ -96,11 +96,14 @@ def check_settings(method: str, settings: Mapping[str, Any]) -> None:
     known = settings_of(method)
     if unknown := sorted(set(settings) - set(known)):
         raise InputError(f"method {method!r} has no setting {unknown[0]!r}; it has {', '.join(known)}.")
-    kinds = get_type_hints(METHODS[method])
+    try:
+        kinds = get_type_hints(METHODS[method])
+    except NameError:  # a method of another package, with annotations that only its type checker resolves
+        return
     for name, value in settings.items():
-        if _is_misfit(value, kinds[name]):
+        if _is_misfit(value, kinds.get(name)):
             raise InputError(
-                f"setting {name!r} of method {method!r} is {value!r}; expected {_told(kinds[name])}."
+                f"setting {name!r} of method {method!r} is {value!r}; expected {_told(kinds.get(name))}."
             )
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from orthoscope.files.image_headers import without_turning
 from orthoscope.files.images import SUFFIXES, checked_whole, quiet
 from orthoscope.files.whole_files import read_bytes
 from orthoscope.geometry.arrays import InputError, ndarray
@@ -53,7 +54,9 @@ def read_picture(path: Path) -> PictureFile:
     checked_whole(content, path)
     with quiet():
         try:
-            pixels = cv2.imdecode(np.frombuffer(_unturned(content), dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+            pixels = cv2.imdecode(
+                np.frombuffer(without_turning(content), dtype=np.uint8), cv2.IMREAD_UNCHANGED
+            )
         except cv2.error:
             pixels = None
     if pixels is None:
@@ -202,7 +205,6 @@ TIFF_KEPT = (
     *(33432, 33723, 34377, 34665, 34675, 34853),
 )
 TIFF_ORDERS = {b"II": "<", b"MM": ">"}
-ORIENTATION = 274
 TIFF_TABLES = (34665, 34853)
 INTEROPERABILITY = 40965  # a place in EXIF that leads to a third table, which nothing reads
 TIFF_BYTES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 13: 4}
@@ -233,22 +235,6 @@ def _tags(content: bytes, place: int, order: str, *, depth: int = 0) -> dict[int
             table = _tags(content, struct.unpack(order + "I", data[:4])[0], order, depth=1)
         tags[tag] = _Tag(kind, length, data, table)
     return tags
-
-
-def _unturned(content: bytes) -> bytes:
-    """The file with a TIFF's orientation tag set to none: OpenCV turns TIFFs by it whatever it is told."""
-    order = TIFF_ORDERS.get(content[:2])
-    if order is None or _suffix_of(content) != ".tif":
-        return content
-    try:
-        place = struct.unpack_from(order + "I", content, 4)[0]
-        for i in range(struct.unpack_from(order + "H", content, place)[0]):
-            entry = place + 2 + 12 * i
-            if struct.unpack_from(order + "H", content, entry)[0] == ORIENTATION:
-                return content[: entry + 8] + struct.pack(order + "HH", 1, 0) + content[entry + 12 :]
-    except struct.error:
-        pass  # OpenCV then says what is wrong with it
-    return content
 
 
 def _keep_in_tiff(made: bytes, source: bytes, _: ndarray) -> bytes:

@@ -18,7 +18,7 @@ from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
 from orthoscope.targets.board import Board
 from orthoscope.targets.chessboard import parse_counts
 from orthoscope.targets.drawing import Drawing
-from orthoscope.targets.lengths import length_text, parse_length
+from orthoscope.targets.lengths import can_be_printed, length_text, parse_length
 from orthoscope.targets.markers import marker_modules, rectangles_of
 
 __all__ = ["BORDER", "DICTIONARY", "TAG_SQUARES", "AprilGrid"]
@@ -47,7 +47,8 @@ class AprilGrid(Board):
     spacing: float
 
     def __post_init__(self) -> None:
-        if not (0 < self.columns * self.rows <= TAGS and 0 < self.size < np.inf and 0 < self.spacing <= 1):
+        tags = 0 < self.columns * self.rows <= TAGS
+        if not (tags and can_be_printed(self.columns, self.rows, self.size) and 0 < self.spacing <= 1):
             raise InputError(
                 f"an AprilGrid of {self.columns}x{self.rows} tags of {self.size:g} m with gaps of"
                 f" {self.spacing:g} of that cannot be used; expected 1 to {TAGS} tags and gaps above 0 up to"

@@ -19,7 +19,7 @@ from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
 from orthoscope.targets.board import Board
 from orthoscope.targets.chessboard import parse_counts, squares_of
 from orthoscope.targets.drawing import Drawing
-from orthoscope.targets.lengths import length_text, parse_length
+from orthoscope.targets.lengths import can_be_printed, length_text, parse_length
 from orthoscope.targets.markers import dictionary, marker_modules, modules_of, rectangles_of
 
 __all__ = ["Charuco"]
@@ -49,7 +49,8 @@ class Charuco(Board):
     legacy: bool = False
 
     def __post_init__(self) -> None:
-        if min(self.columns, self.rows) < 3 or not 0 < self.marker < self.square < np.inf:
+        usable = can_be_printed(self.columns, self.rows, self.square) and 0 < self.marker < self.square
+        if min(self.columns, self.rows) < 3 or not usable:
             raise InputError(
                 f"a ChArUco board of {self.columns}x{self.rows} squares of {self.square:g} m with markers of"
                 f" {self.marker:g} m cannot be used; expected at least 3x3 squares, and markers smaller than"

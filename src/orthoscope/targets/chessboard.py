@@ -17,7 +17,7 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
 from orthoscope.targets.board import Board
 from orthoscope.targets.drawing import Drawing
-from orthoscope.targets.lengths import length_text, parse_length
+from orthoscope.targets.lengths import MOST_SQUARES, can_be_printed, length_text, parse_length
 
 __all__ = ["Chessboard", "parse_counts", "squares_of"]
 
@@ -43,11 +43,12 @@ class Chessboard(Board):
     square: float
 
     def __post_init__(self) -> None:
-        if min(self.columns, self.rows) < 2 or self.columns * self.rows < 6 or not 0 < self.square < np.inf:
+        few = min(self.columns, self.rows) < 2 or self.columns * self.rows < 6
+        if few or not can_be_printed(self.columns, self.rows, self.square):
             raise InputError(
                 f"a chessboard of {self.columns}x{self.rows} inner corners of {self.square:g} m cannot be"
-                " used; expected at least 3x2 inner corners and a square larger than 0, such as"
-                " chessboard:9x6:25mm."
+                f" used; expected at least 3x2 inner corners and at most {MOST_SQUARES}, and a square larger"
+                " than 0 and smaller than 10 km, such as chessboard:9x6:25mm."
             )
 
     @classmethod
@@ -89,7 +90,7 @@ def parse_counts(kind: type[Board], text: str) -> tuple[int, int]:
     Raises:
         InputError: it is no such field.
     """
-    found = re.fullmatch(r"\s*(\d{1,4})x(\d{1,4})\s*", text)
+    found = re.fullmatch(r"\s*([0-9]{1,9})x([0-9]{1,9})\s*", text)
     if not found:
         raise kind.not_understood(f"{kind.kind}:{text}")
     return int(found[1]), int(found[2])

@@ -6,9 +6,18 @@ import re
 
 from orthoscope.geometry.arrays import InputError
 
-__all__ = ["length_text", "parse_length"]
+__all__ = ["can_be_printed", "length_text", "parse_length"]
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+# Metres; a board's squares are neither smaller than a wave of light nor larger than a town.
+SMALLEST, LARGEST = 1e-8, 1e4
+# Squares or tags of a board; a photograph shows fewer than a tenth of that.
+MOST_SQUARES = 100_000
+
+
+def can_be_printed(columns: int, rows: int, size: float) -> bool:
+    """Whether a board of so many squares of this size (metres) can be meant."""
+    return columns * rows <= MOST_SQUARES and SMALLEST <= size <= LARGEST
 
 
 def parse_length(text: str) -> float:

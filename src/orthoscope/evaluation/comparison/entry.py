@@ -42,6 +42,11 @@ def parse_entry(text: str) -> Entry:
     Raises:
         InputError: a method, a lens or a setting that is not there, or a value that is none.
     """
+    if "." in text.split(":")[0]:
+        raise InputError(
+            f"{text!r} is no method; a comparison makes every camera anew. To see how a camera of a file does"
+            f" on photographs, say orthoscope evaluate {text} --on PHOTOS --target chessboard:9x6:25mm."
+        )
     method, *parts = (part.strip() for part in text.strip().split(":"))
     if method not in METHODS:
         raise InputError(

@@ -8,9 +8,9 @@ from typing import NamedTuple
 from orthoscope.evaluation.verdict.advice import Advice, advice_on
 from orthoscope.evaluation.verdict.causes import CAUSES
 from orthoscope.evaluation.verdict.grades import Grade, by_error, lower
-from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
+from orthoscope.evaluation.verdict.situation import FINE_PX, Situation, coarse_px
 
-__all__ = ["Verdict", "verdict_on"]
+__all__ = ["Verdict", "far_on_others", "verdict_on"]
 
 HEADS = {
     Grade.GOOD: "Good",
@@ -53,6 +53,18 @@ def verdict_on(s: Situation) -> Verdict:
     return Verdict(
         grade, first.name if first else "", _far(grade, s), limit, advice.says(s) if advice else ""
     )
+
+
+def far_on_others(rms_px: float, image_size: tuple[int, int]) -> str:
+    """How far off a camera is on photographs that it was not made from, in the words of a verdict.
+
+    Args:
+        rms_px: of what is left over after the poses are fitted, per corner; the corners' own noise is in
+            it, so the camera is rather nearer.
+        image_size: of the camera.
+    """
+    grade = by_error(Situation(error_px=rms_px, coarse_px=coarse_px(image_size)))
+    return f"{HEADS[grade]}: off by about {px(rms_px)} px where these photographs have corners."
 
 
 def _far(grade: Grade, s: Situation) -> str:

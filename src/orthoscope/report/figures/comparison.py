@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
-from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, note, styled
+from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, named, note, styled
 
 __all__ = ["comparison_errors"]
 
@@ -32,7 +32,7 @@ def comparison_errors(comparison: Comparison) -> Figure:
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     _errors(left, comparison)
     _losses(right, comparison)
-    left.set_yticks(range(len(standings)), [standing.entry.name for standing in standings])
+    left.set_yticks(range(len(standings)), [named(standing.entry.name) for standing in standings])
     left.set_ylim(max(len(standings), 1) - 0.4, -0.6)
     for axes in (left, right):
         axes.grid(axis="x")

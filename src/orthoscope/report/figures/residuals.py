@@ -15,7 +15,18 @@ from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.cells import cells_for
 from orthoscope.report.figures.arrows import frame_key, round_magnification, true_to_scale
-from orthoscope.report.figures.style import BLUE, DENSE, EMPTY, INK, ORANGE, RED, frame_figure, note, styled
+from orthoscope.report.figures.style import (
+    BLUE,
+    DENSE,
+    EMPTY,
+    INK,
+    ORANGE,
+    RED,
+    frame_figure,
+    named,
+    note,
+    styled,
+)
 
 __all__ = ["lens_misfit", "residual_vectors", "residuals_by_place", "residuals_by_view"]
 
@@ -187,7 +198,7 @@ def _name_views(axes: Axes, names: list[str], odd: ndarray, tops: ndarray) -> No
 
 
 def _shortened(name: str) -> str:
-    return name if len(name) <= 16 else f"…{name[-15:]}"
+    return named(name if len(name) <= 16 else f"…{name[-15:]}")
 
 
 def _finite(

@@ -18,6 +18,8 @@ from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from orthoscope.files.printable import printable
+
 __all__ = [
     "BLUE",
     "DENSE",
@@ -28,6 +30,7 @@ __all__ = [
     "SKY",
     "frame_axes",
     "frame_figure",
+    "named",
     "note",
     "styled",
     "to_svg",
@@ -112,6 +115,11 @@ def frame_axes(axes: Axes, image_size: tuple[int, int]) -> None:
 def note(axes: Axes, text: str) -> None:
     """A sentence in the middle of axes that have nothing to show."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=GREY)
+
+
+def named(text: str) -> str:
+    """A name out of a file as matplotlib's texts take it: no formula, nothing that cannot be seen."""
+    return printable(text).replace("$", r"\$")
 
 
 def to_svg(figure: Figure, name: str) -> str:

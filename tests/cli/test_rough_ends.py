@@ -1,0 +1,152 @@
+"""Absurd targets, names that command a terminal, a full disk, files that never answer: one sentence each."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orthoscope.cli.executors import threads
+from orthoscope.formats.export import export
+from orthoscope.formats.own.json import save
+from orthoscope.models.camera import Intrinsics
+from orthoscope.simulation.scene import simulate_detections
+from orthoscope.targets.detections import Detections, SetAside
+
+MAIN = "from orthoscope.cli import main; main()"
+LIMIT = 60.0  # seconds that a busy machine may take
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        "chessboard:99999x99999:25mm",
+        "chessboard:9999x9999:25mm",
+        "chessboard:9x6:1e308mm",
+        "chessboard:9x6:-3mm",
+        "chessboard:9x6:1e-320mm",
+        "charuco:9999x9999:25mm:1mm:DICT_4X4_50",
+        "charuco:9x6:1e308mm:1mm:DICT_4X4_50",
+        "aprilgrid:99999x99999:1mm:0.3",
+        "aprilgrid:6x6:1e308mm:0.3",
+    ],
+)
+def test_a_target_that_nobody_prints_is_refused_in_a_sentence(run, tmp_path, spec):
+    told = run("target", spec, "-o", tmp_path / "board.svg")
+    assert told.code == 2
+    assert told.err.startswith("orthoscope: ")
+    assert "cannot be used; expected" in told.err
+    assert told.err.count("\n") == 1
+
+
+def test_names_out_of_files_command_no_terminal(run, scene, tmp_path):
+    whole = simulate_detections(scene, noise_px=0.1, rng=np.random.default_rng(0))
+    aside = (SetAside("\x1b[2Jgone\nwrote      all.png", "no board"),)
+    save(Detections(whole.target, whole.image_size, whole.views, aside), tmp_path / "detections.json")
+    for how in ((), ("--json",)):
+        told = run("detect", tmp_path / "detections.json", *how, "-o", tmp_path / "out.json")
+        assert told.code == 0, told.err
+        assert "\x1b" not in told.out
+        assert "\nwrote      all" not in told.out
+        assert r"[2Jgone\nwrote" in told.out
+
+
+@pytest.mark.parametrize("arguments", [("tools",), ("evaluate", "\x1b[2J\nmissing.json"), ("\x1b[2Jdance",)])
+def test_a_message_has_no_command_to_a_terminal(run, arguments):
+    told = run(*arguments)
+    assert "\x1b" not in told.out + told.err
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no full device")
+@pytest.mark.parametrize("arguments", [["tools"], ["--help"]])
+def test_a_full_disk_under_what_is_printed_is_one_sentence(arguments):
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-c", MAIN, *arguments]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=LIMIT)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "orthoscope: what is printed or written finds no place (No space left on device); free some.\n"
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes are named the POSIX way")
+def test_sigterm_ends_a_verb_whose_file_never_answers(tmp_path):
+    os.mkfifo(tmp_path / "camera.json")
+    process = subprocess.Popen(
+        [sys.executable, "-c", MAIN, "evaluate", str(tmp_path / "camera.json")],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(1.0)  # it then waits; before, it is stopped as well
+    process.send_signal(signal.SIGTERM)
+    _, told = process.communicate(timeout=LIMIT)
+    assert (process.returncode, told.strip()) in (
+        (130, "stopped; files already written are whole"),
+        (-signal.SIGTERM, ""),  # on a machine so busy that nothing of ours was loaded yet
+    )
+
+
+def test_a_thread_that_never_answers_is_not_waited_for(monkeypatch):
+    monkeypatch.setattr("orthoscope.cli.executors.PATIENCE", 0.1)
+    hold, begun = threading.Event(), time.monotonic()
+
+    def stopped() -> None:
+        with threads(1) as executor:
+            executor.submit(hold.wait, LIMIT)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    assert time.monotonic() - begun < LIMIT / 2
+    hold.set()
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [(BrokenProcessPool(), "--jobs 1"), (MemoryError(), "not enough memory")]
+)
+def test_a_killed_worker_and_want_of_memory_leave_with_1(run, monkeypatch, error, words):
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(sys.modules["orthoscope.cli.export"], "tool_lines", fail)
+    told = run("tools")
+    assert told.code == 1
+    assert words in told.err
+    assert told.err.count("\n") == 1
+
+
+def test_comparing_a_camera_of_a_file_says_how_that_is_done(run, tmp_path):
+    told = run("compare", tmp_path, "--with", "camera_info.yaml", "-o", tmp_path / "out")
+    assert told.code == 2
+    assert "orthoscope evaluate camera_info.yaml --on PHOTOS" in told.err
+
+
+def test_another_programs_camera_has_a_verdict_on_photographs(run, scene, tmp_path):
+    save(simulate_detections(scene, noise_px=0.1, rng=np.random.default_rng(0)), tmp_path / "corners.json")
+    for focal, verdict in ((1.0, "Good: off by about 0.1"), (1.5, "Do not use this camera: off by about ")):
+        camera = replace(scene.camera, intrinsics=Intrinsics(520.0 * focal, 518.0 / focal, 324.0, 236.0))
+        export(camera, tmp_path / "camera.yaml", "opencv")
+        told = run(
+            *("evaluate", tmp_path / "camera.yaml", "--on", tmp_path / "corners.json"),
+            *("--target", "chessboard:9x6:25mm"),
+        )
+        assert told.code == 0, told.err
+        assert told.out.startswith(f"verdict    {verdict}")
+
+
+def test_without_opencv_one_is_told_what_to_install(run, monkeypatch):
+    def fail() -> None:
+        raise ModuleNotFoundError("No module named 'cv2'", name="cv2")
+
+    monkeypatch.setattr(sys.modules["orthoscope.cli.export"], "tool_lines", fail)
+    told = run("tools")
+    assert told.code == 2
+    assert "pip install opencv-python-headless" in told.err
