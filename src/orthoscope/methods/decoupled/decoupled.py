@@ -226,7 +226,8 @@ def _with_formulas(model: Model, left: _Open) -> list[Model]:
     if not found:
         raise InputError(
             f"a formula cannot be fitted {' or '.join(left.fits)} with first_lens"
-            f" {' or '.join(left.first_lens)}; expected fit 'joint' with first_lens 'formula', or fit 'pairs' with first_lens 'free'."
+            f" {' or '.join(left.first_lens)}; expected fit 'joint' with first_lens 'formula', or fit"
+            " 'pairs' with first_lens 'free'."
         )
     return found
 
