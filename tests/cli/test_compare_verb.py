@@ -35,10 +35,11 @@ def test_it_prints_a_table_the_best_first_and_what_follows(run, calibrated, tmp_
         "lens",
         "target",
     ]
-    assert [row.split()[0] for row in rows[:3]] == ["fccm:brown", "fccm:brown:k1", "mldc"]
+    assert rows[0].split()[0] == "fccm:brown"
+    assert {row.split()[0] for row in rows[1:3]} == {"fccm:brown:k1", "mldc"}
     assert re.fullmatch(r"fccm:brown +0\.\d+ ± 0\.\d+ +best( +[\d.]+){4} +brown +flat", rows[0])
     assert "verdict    fccm:brown foresees these photographs best" in told.out
-    assert "The next, fccm:brown:k1, loses" in told.out
+    assert re.search(r"The next, (fccm:brown:k1|mldc), loses", told.out)
     assert {path.name for path in tmp_path.iterdir()} == FILES
     assert all(str(tmp_path / name) in rows[-1] for name in FILES)
 

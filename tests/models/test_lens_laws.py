@@ -197,7 +197,9 @@ def test_a_coefficient_that_is_no_number_is_refused():
         Brown(k1=float("nan"))
 
 
-@pytest.mark.parametrize("lens", [kind() for kind in LENSES.values() if kind.__name__ != "Fet"])
+@pytest.mark.parametrize(
+    "lens", [kind() for kind in LENSES.values() if kind.__name__ not in ("Fet", "Stereographic")]
+)
 def test_a_lens_without_coefficients_does_nothing(lens):
     x, y = np.array([0.0, 0.3, -0.7]), np.array([0.0, -0.2, 0.5])
     assert_allclose(lens.warp(x, y), (x, y), atol=ROUNDING)

@@ -36,7 +36,7 @@ BEST_PEER = {
 
 @pytest.fixture(scope="module")
 def calibrel(datasets: Path) -> Calibration:
-    return decoupled(classic(datasets, "calibrel"), folds=3)
+    return decoupled(classic(datasets, "calibrel"))
 
 
 @pytest.mark.slow

@@ -52,9 +52,11 @@ def predicted(camera, poses, detections):
 @pytest.mark.parametrize(("scene", "nce"), [("low", 0.02), ("high", 0.025)])
 def test_repeated_ends_at_the_joint_minimum_in_few_rounds(scene, nce):
     training, test = simulated(scene, Condition(), seed=0, trial=0)
+    near = fccm(training, lens="pfet")
+    training = near.detections  # a board that looks alike both ways up may have been turned in some views
     found = mldc(training)
     assert (found.status, found.steps <= 20) == ("converged", True)
-    camera, poses = joint_minimum(training, fccm(training, lens="pfet"))
+    camera, poses = joint_minimum(training, near)
     mine = predicted(found.camera, found.camera_from_target, training)
     assert np.sqrt(((mine - predicted(camera, poses, training)) ** 2).sum(1).mean()) < 1e-6  # px, as promised
     assert evaluate_on(found.camera, test).nce < nce
