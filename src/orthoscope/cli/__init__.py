@@ -73,6 +73,13 @@ def main() -> None:
         sys.exit(2)
     except BrokenPipeError:
         sys.exit(0)
+    except ModuleNotFoundError as error:
+        from orthoscope.geometry.missing import how_to_install
+
+        if (told := how_to_install(error)) is None:
+            raise
+        click.echo(f"orthoscope: {told}", err=True)
+        sys.exit(2)
     except (ValueError, RuntimeError) as error:
         _leave(error)
 
