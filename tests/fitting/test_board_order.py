@@ -13,7 +13,8 @@ from helpers.scenes import NARROW
 from orthoscope.fitting.board_order import in_one_order, turns_of
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm, fit_flat
-from orthoscope.targets.detections import Detections, Target, View, chessboard
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target, chessboard
 
 ALIKE = {"half a turn": chessboard(8, 6, 0.025), "a quarter": chessboard(7, 7, 0.025)}
 for_every_alike = pytest.mark.parametrize("target", ALIKE.values(), ids=ALIKE.keys())

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.board import Board
+from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
 
 BOARDS: tuple[Board, ...] = (
@@ -13,6 +15,9 @@ BOARDS: tuple[Board, ...] = (
     Chessboard(7, 5, 0.0254),
     Chessboard(6, 6, 0.03),
     Chessboard(5, 5, 0.03),
+    Charuco(7, 5, 0.03, 0.022, "DICT_5X5_100"),
+    Charuco(5, 8, 0.03, 0.024, "DICT_4X4_50", legacy=True),
+    AprilGrid(4, 3, 0.05, 0.3),
 )
 
 every_board = pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.description)

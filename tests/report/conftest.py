@@ -224,6 +224,13 @@ def dense() -> Evaluation:
     return evaluated(photographed(camera, chessboard(20, 14, 0.02), 50, tilt=0.6, distance=0.5))
 
 
+@pytest.fixture(scope="session")
+def two_hundred() -> Evaluation:
+    """200 views of 280 corners, the most that the page is made for."""
+    camera = Camera((1920, 1080), Intrinsics(1500.0, 1500.0, 958.0, 541.0), Brown(k1=-0.2, k2=0.05))
+    return evaluated(photographed(camera, chessboard(20, 14, 0.02), 200, tilt=0.6, distance=0.5))
+
+
 def _pose(generator: np.random.Generator, target: Target, tilt: float, distance: float, turn: float) -> Pose:
     rotation = rotation_from_vector(generator.uniform(-tilt, tilt, 3))
     middle = np.array([0.0, 0.0, distance]) + generator.uniform(-0.35, 0.35, 3) * distance

@@ -108,7 +108,7 @@ def test_its_dots_are_the_errors(far):
 def test_the_page_is_whole_closed_and_the_same_twice(comparison):
     page = comparison_page(comparison)
     assert page == comparison_page(comparison)
-    assert page.endswith("</html>")
+    assert page.endswith("</html>\n")
     assert "default-src 'none'" in page
     assert "http-equiv" in page
     assert all(f" {loads}=" not in page for loads in ("src", "srcset", "action"))

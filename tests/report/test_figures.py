@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import re
 from dataclasses import replace
 
@@ -13,17 +11,15 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from numpy.testing import assert_allclose
-from PIL import Image  # comes with matplotlib
 
 from orthoscope.evaluation.misfit.misfit import misfit
-from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.cells import Cells, cells_for
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import LENSES, Brown, KannalaBrandt
+from orthoscope.report.data.lens_curve import along_angles
 from orthoscope.report.figures import (
     lens_difference,
     lens_misfit,
-    photograph_uri,
     residual_vectors,
     residuals_by_place,
     residuals_by_view,
@@ -31,7 +27,7 @@ from orthoscope.report.figures import (
     target_shape,
     to_svg,
 )
-from orthoscope.report.figures.lens import _along_angles, distortion_curve
+from orthoscope.report.figures.lens import distortion_curve
 from orthoscope.report.figures.style import RED
 from orthoscope.report.plates import PLATES
 from orthoscope.targets.detections import Detections
@@ -166,7 +162,7 @@ def test_the_distortion_curve_of_every_lens_can_be_drawn(name, ordinary):
 def test_radial_displacement_is_the_formulas_own():
     camera = Camera((640, 480), Intrinsics(500.0, 500.0, 320.0, 240.0), Brown(k1=-0.2))
     angles = np.linspace(0.0, 0.6, 7)
-    radius, displacement = _along_angles(camera, angles)
+    radius, displacement = along_angles(camera, angles)
     s = np.tan(angles)[:, None]
     assert_allclose(
         radius, np.broadcast_to(500.0 * (s - 0.2 * s**3), radius.shape), atol=1e-9
@@ -177,7 +173,7 @@ def test_radial_displacement_is_the_formulas_own():
 def test_displacement_of_a_lens_of_the_angle_is_taken_from_the_equidistant_image_past_90_degrees():
     camera = Camera((640, 480), Intrinsics(150.0, 150.0, 320.0, 240.0), KannalaBrandt(k1=-0.01))
     angles = np.array([0.0, 1.0, 1.7])
-    _, displacement = _along_angles(camera, angles)
+    _, displacement = along_angles(camera, angles)
     assert_allclose(displacement[:, 0], -1.5 * angles**3, atol=1e-9)
 
 
@@ -197,19 +193,3 @@ def test_cell_means_are_nan_where_nothing_fell():
 def test_cells_are_nearly_square_and_about_as_many_as_wanted(size):
     cells = cells_for(size, 100)
     assert 1 <= cells.columns * cells.rows <= 120
-
-
-def test_a_wide_photograph_is_shrunk_by_a_whole_factor_and_blue_stays_blue():
-    image = np.zeros((40, 2300, 3), dtype=np.uint8)
-    image[..., 0] = 250
-    shown = Image.open(io.BytesIO(base64.b64decode(photograph_uri(image).partition(",")[2])))
-    assert shown.size == (766, 13)
-    assert_allclose(np.asarray(shown).reshape(-1, 3).mean(0), [0, 0, 250], atol=4)  # JPEG's own error
-
-
-@pytest.mark.parametrize(
-    "image", [np.zeros((4, 4)), np.zeros((4, 4, 4), np.uint8), np.zeros((0, 4), np.uint8)]
-)
-def test_what_is_no_8_bit_photograph_is_an_input_error(image):
-    with pytest.raises(InputError, match="expected uint8"):
-        photograph_uri(image)

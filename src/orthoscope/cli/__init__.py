@@ -16,6 +16,7 @@ from orthoscope.cli.compare import compare
 from orthoscope.cli.demo import demo
 from orthoscope.cli.detect import detect
 from orthoscope.cli.evaluate import evaluate
+from orthoscope.cli.executors import single_threaded
 from orthoscope.cli.export import convert, export, tools
 from orthoscope.cli.given_files import keeping_inputs
 from orthoscope.cli.paper import paper
@@ -60,9 +61,10 @@ for verb in (
 
 
 def main() -> None:
-    """Run the command line; errors become one message and an exit code."""
+    """Run the command line, BLAS with one thread; errors become one message and an exit code."""
     try:
-        verbs(standalone_mode=False)
+        with single_threaded():
+            verbs(standalone_mode=False)
     except click.exceptions.Exit as leave:
         sys.exit(leave.exit_code)
     except (click.Abort, KeyboardInterrupt):

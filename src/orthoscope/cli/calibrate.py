@@ -42,6 +42,12 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @options.loss
 @options.image_size
 @options.folds
+@click.option(
+    "--without",
+    multiple=True,
+    metavar="NAME",
+    help="Leave this photograph out, once for each; detections.json keeps it.",
+)
 @options.jobs
 @options.cluster
 @click.option(
@@ -81,6 +87,7 @@ def calibrate_into(
     loss: str | None = None,
     image_size: tuple[int, int] | None = None,
     folds: int = 5,
+    without: tuple[str, ...] = (),
     jobs: int | None = None,
     cluster: str | None = None,
     export: str | None = None,
@@ -100,6 +107,7 @@ def calibrate_into(
     from orthoscope.formats.own.json import save, text_of
     from orthoscope.methods import calibrate as run
     from orthoscope.methods import settings_of
+    from orthoscope.targets.left_out import left_out
 
     check_folder(out)
     lenses = _lenses_of(export)
@@ -112,6 +120,7 @@ def calibrate_into(
         )
     save(detections, out / "detections.json")
     written = [out / "detections.json"]
+    detections = left_out(detections, without) if without else detections
     with bar("calibrating") as progress:
         told = {"judging": progress} if "judging" in settings_of(method) else {}
         calibration = run(detections, method=method, **given, **told)
@@ -123,7 +132,7 @@ def calibrate_into(
     if export:
         written += _write_for(export, calibration, out)
     if report:
-        written.append(_write_report(evaluation, files, out, keep=keep))
+        written.append(_write_report(evaluation, files, out, keep=keep, jobs=jobs))
     if undistort:
         written.append(_write_straight(evaluation, files, out, keep=keep, jobs=jobs, cluster=cluster))
     if as_json:
@@ -153,13 +162,15 @@ def _write_for(tool: str, calibration: Any, out: Path) -> list[Path]:
     return list(exported.files)
 
 
-def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str) -> Path:
+def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None) -> Path:
+    from orthoscope.cli.executors import threads
+    from orthoscope.cli.progress import bar
     from orthoscope.report.page import write_report
-    from orthoscope.straight.undistort import before_and_after
+    from orthoscope.report.pictures import pictures_of
 
-    write_report(
-        evaluation, out / "report.html", photograph=before_and_after(evaluation.calibration, files, keep=keep)
-    )
+    with threads(jobs) as executor, bar("report") as progress:
+        pictures = pictures_of(evaluation.calibration, files, keep=keep, executor=executor, progress=progress)
+    write_report(evaluation, out / "report.html", pictures=pictures)
     return out / "report.html"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,7 @@ Example:
   wrote      comparison/comparison.json, comparison/comparison.html, comparison/comparison.svg
 
 \b
+comparison.svg, for print, is written where matplotlib is installed (pip install 'orthoscope[figures]').
 WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or
 decoupled:brown:target=flat. PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
 Exit: 0 done, 1 the photographs are too few to hold any out, 2 the command is wrong.
@@ -93,8 +95,9 @@ def compare(
     texts = {
         "comparison.json": text_of(comparison),
         "comparison.html": comparison_page(comparison),
-        "comparison.svg": comparison_svg(comparison),
     }
+    if find_spec("matplotlib"):  # the figure for print, where what draws it is installed
+        texts["comparison.svg"] = comparison_svg(comparison)
     for name, text in texts.items():
         write_text(out / name, text)
     written = "wrote      " + ", ".join(str(out / name) for name in texts)

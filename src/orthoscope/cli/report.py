@@ -24,7 +24,7 @@ where it is missing, of another calibration, or --folds is asked for.
 @click.command(epilog=EXAMPLE)
 @options.calibration_file
 @click.option(
-    "--photos", multiple=True, metavar="PHOTOS", help="The photographs, to show one before and after."
+    "--photos", multiple=True, metavar="PHOTOS", help="The photographs, to show them with their corners."
 )
 @options.folds_anew
 @options.keep
@@ -38,6 +38,15 @@ where it is missing, of another calibration, or --folds is asked for.
     show_default=True,
     help="File to write.",
 )
+@click.option(
+    "--figures",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help=(
+        "Also write the figures for a paper, SVG and PDF, into this folder (pip install"
+        " 'orthoscope[figures]')."
+    ),
+)
 def report(
     calibration: Path,
     photos: tuple[str, ...],
@@ -46,16 +55,27 @@ def report(
     jobs: int | None,
     cluster: str | None,
     out: Path,
+    figures: Path | None,
 ) -> None:
     """Write the report page of a calibration: one HTML file that needs nothing else."""
+    from orthoscope.cli.executors import threads
     from orthoscope.cli.judged import judged
-    from orthoscope.files.images import photographs
+    from orthoscope.cli.progress import bar
+    from orthoscope.files.images import names_of, photographs
     from orthoscope.files.whole_files import check_folder
     from orthoscope.report.page import write_report
-    from orthoscope.straight.undistort import before_and_after
+    from orthoscope.report.pictures import pictures_of
+    from orthoscope.report.print_files import check_matplotlib, write_figures
 
     check_folder(out.parent)
+    if figures:
+        check_matplotlib()
+        check_folder(figures)
     evaluation = judged(calibration, folds=folds, jobs=jobs, cluster=cluster)
-    files = {path.name: path for path in photographs(photos)} if photos else {}
-    write_report(evaluation, out, photograph=before_and_after(evaluation.calibration, files, keep=keep))
-    click.echo(f"wrote      {out}")
+    paths = photographs(photos) if photos else []
+    files = dict(zip(names_of(paths), paths, strict=True))
+    with threads(jobs) as executor, bar("photographs") as progress:
+        pictures = pictures_of(evaluation.calibration, files, keep=keep, executor=executor, progress=progress)
+    write_report(evaluation, out, pictures=pictures)
+    drawn = write_figures(evaluation, figures) if figures else []
+    click.echo(f"wrote      {out}" + (f", {len(drawn)} figures into {figures}/" if drawn else ""))

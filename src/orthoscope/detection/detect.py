@@ -17,18 +17,18 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-from orthoscope.detection.chessboard import board_size, see_chessboard
-from orthoscope.detection.sight import Sight, Unseen
+from orthoscope.detection.chessboard import board_size
+from orthoscope.detection.sight import Sight
+from orthoscope.detection.table import check_can_be_seen, see
 from orthoscope.files.images import names_of, photographs, read_image
-from orthoscope.geometry.arrays import CalibrationError, InputError, ndarray
+from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.detections import Detections, SetAside, View
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
-__all__ = ["DETECTORS", "detect"]
+__all__ = ["detect"]
 
-Detector = Callable[[ndarray, Target], Sight | Unseen]
 LISTED = 5  # photographs whose reasons are told where none showed the target
 LOOKED_AT = 3  # photographs that are then looked at for a board of another size
 
@@ -60,13 +60,13 @@ def detect(
     photograph shows the target.
     """
     target = parse_target(target) if isinstance(target, str) else target
-    detector = _detector_for(target)
+    check_can_be_seen(target)
     files = photographs(paths)
     names = names_of(files)
     looks: list[_Look] = []
     with nullcontext(executor) if executor else ThreadPoolExecutor(jobs or os.cpu_count()) as run:
         places = [file.absolute() for file in files]  # an executor's workers may stand in another folder
-        for look in run.map(_look, places, [target] * len(files), [detector] * len(files)):
+        for look in run.map(_look, places, [target] * len(files)):
             looks.append(look)
             if progress:
                 progress(len(looks), len(files), names[len(looks) - 1])
@@ -77,32 +77,14 @@ def detect(
     return Detections(target, size, tuple(views), tuple(aside))
 
 
-def _chessboard(grey: ndarray, target: Target) -> Sight | Unseen:
-    if not isinstance(target.board, Chessboard):
-        raise InputError(f"target {target.name!r} has no board; expected a chessboard.")
-    return see_chessboard(grey, target.board)
-
-
-DETECTORS: dict[str, Detector] = {Chessboard.kind: _chessboard}
-
-
-def _detector_for(target: Target) -> Detector:
-    if target.kind not in DETECTORS:
-        raise InputError(
-            f"target {target.name!r} cannot be looked for in photographs; expected one of"
-            f" {', '.join(DETECTORS)}. Hand in corners instead."
-        )
-    return DETECTORS[target.kind]
-
-
-def _look(file: Path, target: Target, detector: Detector) -> _Look:
+def _look(file: Path, target: Target) -> _Look:
     """One photograph, from its file to its corners (ids and pixels)."""
     try:
         grey = read_image(file, grey=True)
     except InputError as error:
         return _Look(None, "", None, str(error).removeprefix(f"{file} "))
     size = (grey.shape[1], grey.shape[0])
-    found = detector(grey, target)
+    found = see(grey, target)
     return _Look(
         size,
         hashlib.sha256(grey.tobytes()).hexdigest(),

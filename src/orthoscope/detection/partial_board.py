@@ -109,12 +109,14 @@ def grid_of(grey: ndarray, corners: Float[ndarray, "r c 2"], most: int) -> Grid:
     return _taken_further(grey, corners, np.ones(corners.shape[:2], dtype=bool), bright, most)
 
 
-def filled(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "r c 2"]:
+def filled(grid: Float[ndarray, "r c 2"], *, rounds: int = 1000) -> Float[ndarray, "r c 2"]:
     """The grid with its gaps filled: each from those of its neighbours whose lines foresee it, near ones
     first.
     """
     grid = grid.copy()
-    while np.isnan(grid[..., 0]).any():
+    for _ in range(rounds):
+        if not np.isnan(grid[..., 0]).any():
+            break
         told = np.stack([part for turn in range(4) for part in _foreseen(grid, turn)])
         known = np.isfinite(told[..., 0])
         count = known.sum(0)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.detection.grid import grid_shape, nearest_neighbour
+from orthoscope.detection.grid import GridShape, grid_shape, nearest_neighbour
 from orthoscope.detection.saddle import fit_saddles
 from orthoscope.geometry.arrays import Bool, Float, ndarray
 
@@ -27,6 +27,7 @@ SHARE = 0.45  # of a square: half the window of the fit
 USUAL = 50.0  # px a square: larger ones are reduced to about this
 REACH = 18.0  # px: half the largest window
 SMOOTHING = 0.5  # px, sigma: what a camera sharpened until it jumps from pixel to pixel has slopes again
+ARM_USED = 0.85  # of an arm: blur reaches over its side
 NOISE_LEFT = 0.41  # of its variance, after smoothing
 SADDLE_SQUARE = 0.6  # mean square of a blurred saddle over its window, about
 FARTHEST = 0.35  # of a square: a fit that ends farther from its start is not believed,
@@ -43,7 +44,12 @@ class Refined(NamedTuple):
 
 
 def refined(
-    grey: ndarray, rough: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], *, approach: bool = True
+    grey: ndarray,
+    rough: Float[ndarray, "m 2"],
+    places: Float[ndarray, "m 2"],
+    *,
+    approach: bool = True,
+    arm: float = 1.0,
 ) -> Refined:
     """Corners from ones that are right to a fifth of a step of their lattice.
 
@@ -51,6 +57,7 @@ def refined(
         grey: (h,w) uint8.
         rough: (m,2) pixels.
         places: (m,2) column and row of each in the lattice, in steps.
+        arm: how far from the edges something else than squares is printed, in steps.
         approach: whether cornerSubPix comes near first; not where it went astray before.
     """
     square = nearest_neighbour(rough, places)
@@ -66,6 +73,7 @@ def refined(
         _window(shape.along),
         _window(shape.down),
         bends=np.stack([shape.bend_along, shape.bend_down], axis=1),
+        arms=_arms(shape, arm),
     )
     allowed = np.maximum(FARTHEST * nearest_neighbour(near, places), 1.0)
     signal = SADDLE_SQUARE * saddles.contrast**2
@@ -112,6 +120,12 @@ def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
             -1, 2
         )
     return places.astype(float)
+
+
+def _arms(shape: GridShape, arm: float) -> Float[ndarray, " m"]:
+    """An arm of so many steps as a share of each corner's window; 1 where it reaches over it."""
+    longest = np.maximum(np.maximum(np.hypot(*shape.along.T), np.hypot(*shape.down.T)), 1e-9)
+    return np.minimum(ARM_USED * arm / np.minimum(SHARE, REACH / longest), 1.0)
 
 
 def _window(square: Float[ndarray, "m 2"]) -> Float[ndarray, "m 2"]:

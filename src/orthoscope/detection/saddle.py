@@ -65,14 +65,16 @@ def fit_saddles(
     down: Float[ndarray, "n 2"],
     *,
     bends: Float[ndarray, "n 2"],
+    arms: Float[ndarray, " n"] | None = None,
 ) -> Saddles:
     """The saddles near `start`.
 
     grey: (h,w) uint8. along, down: from a corner to the sides of its window, pixels, in the directions of its
-    two edges. bends: curvature of the two edges, 1/px. Where the steps do not settle the last place is given,
-    with what it explains.
+    two edges. bends: curvature of the two edges, 1/px. arms: (n,) how
+    far from the edges, as a share of the window, its corners are left out, where something else is printed.
+    Where the steps do not settle the last place is given, with what it explains.
     """
-    fit = _Fit(grey, start, along, down, bends)
+    fit = _Fit(grey, start, along, down, bends, np.ones(len(start)) if arms is None else arms)
     fit.begin_with_one_blur()
     for share, still in STAGES:
         fit.settle(fit.by_size, share, still)
@@ -82,7 +84,10 @@ def fit_saddles(
 class _Fit:
     """All corners of a picture on their way; by_size: their order, windows of one size together."""
 
-    def __init__(self, grey: ndarray, start: ndarray, along: ndarray, down: ndarray, bends: ndarray) -> None:
+    def __init__(
+        self, grey: ndarray, start: ndarray, along: ndarray, down: ndarray, bends: ndarray, arms: ndarray
+    ) -> None:
+        self.arms = arms
         self.grey, self.along, self.down = grey, along, down
         angles = np.stack([np.arctan2(along[:, 1], along[:, 0]), np.arctan2(down[:, 1], down[:, 0])], axis=1)
         self.shapes = Shapes(start.astype(float), angles, np.ones(len(start)), bends, np.zeros(len(start)))
@@ -110,6 +115,7 @@ class _Fit:
                 self.shapes.places[some],
                 shares[some] * self.along[some],
                 shares[some] * self.down[some],
+                self.arms[some] / shares[some, 0],
             )
             rows = np.arange(len(some))
             for _ in range(STEPS):

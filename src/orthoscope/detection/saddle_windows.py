@@ -49,7 +49,9 @@ class Windows:
     """The pixels of n windows, k each.
 
     grey: (h,w) uint8. start: (n,2) where the corners are to a few pixels. along, down: (n,2) from a corner to
-    the sides of its window. level: (n,) mean grey, which the sums do without.
+    the sides of its window. arms: (n,) how far
+    from the edges the window's corners are left out, as a share of it. level: (n,) mean grey, which the sums
+    do without.
     """
 
     def __init__(
@@ -58,10 +60,12 @@ class Windows:
         start: Float[ndarray, "n 2"],
         along: Float[ndarray, "n 2"],
         down: Float[ndarray, "n 2"],
+        arms: Float[ndarray, " n"],
     ) -> None:
         height, width = grey.shape
         self._middle = np.clip(np.rint(start).astype(int), 0, (width - 1, height - 1))
         self._to_window = _inverses(along, down)
+        self._arms = arms[:, None].astype(np.float32)
         reach = int(np.ceil((np.abs(along) + np.abs(down)).max()))
         x, y = _reached(self._to_window, reach)
         first = self._middle[:, 1] * width + self._middle[:, 0]
@@ -84,7 +88,7 @@ class Windows:
         d2 += bend2 * a2 * a2
         columns = np.empty((len(which), COLUMNS + 1, d1.shape[1]), dtype=np.float32)
         f1, f2, f1_a1, f2_a2, blurring, saddle, one, across, upright, picture = columns.transpose(1, 0, 2)
-        np.multiply(_root_weights(u, v), self._inside[which], out=one)
+        np.multiply(_root_weights(u, v, self._arms[which]), self._inside[which], out=one)
         e1, e2 = np.tanh(d1), np.tanh(d2)
         e1_one = np.multiply(e1, one, out=u)
         np.multiply(e1_one, e2, out=saddle)
@@ -127,11 +131,18 @@ def _reached(to_window: Float[ndarray, "2 n 2"], reach: int) -> Int[ndarray, "2 
     return offsets[:, np.maximum(*np.abs(out, out=out)).min(0) < NEARLY_OUTSIDE]
 
 
-def _root_weights(u: ndarray, v: ndarray) -> ndarray:
-    """Roots of weights: 1 at the corner, 0 at the window's side, smooth between; written over u."""
+def _root_weights(u: ndarray, v: ndarray, arms: ndarray) -> ndarray:
+    """Roots of weights: 1 at the corner, 0 at the window's side, smooth between; written over u.
+
+    Where both distances are beyond an arm, something else is printed: nothing is weighed there.
+    """
+    off_arms = np.minimum(np.abs(u), np.abs(v)) > arms if (arms < 1).any() else None
     out = np.maximum(np.abs(u, out=u), np.abs(v, out=v), out=u)
     np.multiply(out, out, out=out)
-    return np.maximum(np.subtract(1.0, out, out=out), 0.0, out=out)
+    np.maximum(np.subtract(1.0, out, out=out), 0.0, out=out)
+    if off_arms is not None:
+        out[off_arms] = 0.0
+    return out
 
 
 def _products(columns: Float[ndarray, "n p k"]) -> Float[ndarray, "n p p"]:

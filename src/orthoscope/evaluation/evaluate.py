@@ -31,6 +31,7 @@ from orthoscope.fitting.held_out import HeldOut, held_out
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import InputError, ndarray
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.methods import METHODS
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
@@ -79,6 +80,7 @@ class UnseenError:
     nce: float
 
 
+@with_one_thread
 def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | None = None) -> UnseenError:
     """The error of a camera on other photographs: the camera stays fixed, the pose of each view is fitted.
 
@@ -103,6 +105,7 @@ def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | 
     return UnseenError(used, rms(np.concatenate(residuals)), tuple(rms(e) for e in residuals), nce)
 
 
+@with_one_thread
 def evaluate(
     calibration: Calibration,
     *,

@@ -16,6 +16,7 @@ import numpy as np
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, Int, ndarray
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
@@ -93,6 +94,7 @@ def folds_of_views(views: int, folds: int, *, seed: int = 0) -> list[ndarray]:
     ]
 
 
+@with_one_thread
 def held_out(
     detections: Detections,
     refit: Refit,
@@ -126,6 +128,7 @@ def held_out(
     return HeldOut(tuple(cameras), tuple(shapes), tuple(poses), tuple(residuals))
 
 
+@with_one_thread
 def _fold(
     detections: Detections, refit: Refit, part: Int[ndarray, " f"]
 ) -> tuple[Calibration, tuple[Pose, ...], tuple[ndarray, ...]] | None:

@@ -12,6 +12,7 @@ from orthoscope.fitting.closed_form import poses_of_camera
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import CalibrationError
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
@@ -22,6 +23,7 @@ from orthoscope.targets.detections import Detections
 __all__ = ["resect"]
 
 
+@with_one_thread
 def resect(
     camera: Camera, detections: Detections, *, shape: TargetShape | None = None, loss: Loss | None = None
 ) -> tuple[Pose, ...]:

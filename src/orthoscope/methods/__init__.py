@@ -14,6 +14,7 @@ from typing import Any
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import InputError
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.targets.detections import Detections
 
 __all__ = ["METHODS", "calibrate", "settings_of"]
@@ -40,6 +41,7 @@ METHODS = _Methods(
 )
 
 
+@with_one_thread
 def calibrate(detections: Detections, *, method: str = "decoupled", **settings: Any) -> Calibration:
     """Calibrate a camera from detections by a method of METHODS; its settings are the method's own (lens,
     skew, loss, ...).

@@ -29,6 +29,7 @@ from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.models.lenses import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
 from orthoscope.solve.losses import LOSSES, Loss
@@ -53,6 +54,7 @@ FEW = 2000  # corners
 SQUARE = 1.1  # times longer than wide: cameras have no pixels that are less square
 
 
+@with_one_thread
 def fccm(
     detections: Detections,
     *,

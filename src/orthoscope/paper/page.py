@@ -124,13 +124,17 @@ def _figure(exhibit: FigureWithClaims) -> dict[str, Any]:
 def _fig7(straightened: Straightened | None) -> dict[str, Any] | None:
     if straightened is None:
         return None
-    from orthoscope.report.figures import photograph_uri
+    from orthoscope.report.pictures import LARGE, LARGE_BYTES, picture_uri
 
     return {
         "name": straightened.name,
-        "photograph": photograph_uri(straightened.photograph),
+        "photograph": picture_uri(straightened.photograph, LARGE, LARGE_BYTES),
         "pictures": [
-            (name, None, picture) if isinstance(picture, str) else (name, photograph_uri(picture), "")
+            (
+                (name, None, picture)
+                if isinstance(picture, str)
+                else (name, picture_uri(picture, LARGE, LARGE_BYTES), "")
+            )
             for name, picture in straightened.pictures
         ],
     }

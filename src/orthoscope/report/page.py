@@ -1,105 +1,128 @@
-"""The report: one HTML file that needs no network, from an evaluation.
+"""The report: one HTML file that needs no network and draws itself, from an evaluation.
 
-The text is page.html.jinja with page.css; figures go in as SVG, photographs as data URIs; a policy in the
-page itself forbids the browser to load anything else. The same evaluation gives the same bytes: nothing of
-the day or the machine goes in.
+Words and tables are HTML as they stand; the numbers of the figures go in as JSON, and page.js, the one
+script, draws them. A policy in the page itself forbids the browser to load anything, and to run or to style
+by anything but what has the hash of our own script and style. The same evaluation gives the same bytes:
+nothing of the day or the machine goes in.
 """
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
+
+import msgspec
 
 from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.files.whole_files import write_text
-from orthoscope.geometry.arrays import ndarray
-from orthoscope.report import tables
-from orthoscope.report.shape import shape_rows
+from orthoscope.report import sections
+from orthoscope.report.data.rounded import PLACE, RESIDUAL
+from orthoscope.report.data.trust import trust
+from orthoscope.report.data.views import views
+from orthoscope.report.html import Html, raw, tag
+from orthoscope.report.panels import PANELS
+from orthoscope.report.pictures import Pictures
+from orthoscope.targets.left_out import LEFT_OUT
 
-if TYPE_CHECKING:
-    from jinja2 import Template
-
-__all__ = ["Photograph", "report_page", "write_report"]
-
-Photograph = tuple[str, ndarray, ndarray]  # name, before, after: uint8, grey (h,w) or BGR (h,w,3)
+__all__ = ["closed_page", "report_page", "write_report"]
 
 
-def report_page(evaluation: Evaluation, *, photograph: Photograph | None = None) -> str:
+def report_page(evaluation: Evaluation, *, pictures: Pictures | None = None) -> str:
     """The page as text.
 
-    photograph: name, the photograph and the same without distortion (uint8, grey or BGR).
-    Raises InputError where the photograph is no such array.
+    Args:
+        pictures: the photographs that it shows (`pictures_of`); none by default.
     """
+    pictures = pictures or Pictures()
+    found = {panel.name: panel.data(evaluation) for panel in PANELS}
+    found["trust"] = trust(evaluation)
     calibration = evaluation.calibration
-    shown = _shown(photograph)  # first, since it can be wrong
-    return _template().render(
-        evaluation=evaluation,
-        calibration=calibration,
-        detections=calibration.detections,
-        cards=tables.cards(evaluation),
-        parameters=tables.parameters(calibration),
-        lens=tables.lens_rows(calibration),
-        misfits=tables.misfit_rows(evaluation),
-        shape=shape_rows(calibration),
-        candidates=tables.candidate_rows(calibration),
-        warnings=tables.warnings(evaluation),
-        views=tables.view_rows(evaluation),
-        settings=tables.settings_rows(calibration),
-        lens_name=tables.lens_name(calibration.camera),
-        plates=_plates(evaluation),
-        photograph=shown,
-    )
+    detections = calibration.detections
+    width, height = detections.image_size
+    data = {
+        "frame": {"width": width, "height": height},
+        "units": {"place": PLACE, "residual": RESIDUAL},
+        "centre": [calibration.camera.intrinsics.cx, calibration.camera.intrinsics.cy],
+        "columns": detections.target.grid and detections.target.grid[0],
+        "views": views(evaluation),
+        "leftOut": [entry.image for entry in detections.set_aside if entry.reason == LEFT_OUT],
+        "large": pictures.large and pictures.large[0],
+        "panels": {name: told for name, told in found.items() if not isinstance(told, str)},
+    }
+    count = len(detections.views)
+    title = f"Calibration report: {count} photograph{'' if count == 1 else 's'}, {detections.target.name}"
+    body = [
+        sections.opening(evaluation),
+        tag(
+            "main",
+            sections.first_screen(evaluation, found["trust"], pictures),
+            sections.key_figures(evaluation),
+            sections.what_to_know(evaluation),
+            sections.photographs(evaluation, pictures),
+            sections.figures(found),
+            sections.before_and_after(pictures),
+            sections.numbers(evaluation),
+            sections.set_aside(detections),
+        ),
+        sections.closing(evaluation),
+    ]
+    return closed_page(title, body, data=data, version=calibration.version)
 
 
-def write_report(evaluation: Evaluation, path: str | Path, *, photograph: Photograph | None = None) -> None:
+def write_report(evaluation: Evaluation, path: str | Path, *, pictures: Pictures | None = None) -> None:
     """Write the page to a file, as a whole or not at all: an interrupted run leaves what was there before.
 
-    Raises InputError where the file cannot be written or the photograph is none.
+    Args:
+        pictures: the photographs that it shows (`pictures_of`); none by default.
+    Raises:
+        InputError: the file cannot be written.
     """
-    write_text(path, report_page(evaluation, photograph=photograph))
+    write_text(path, report_page(evaluation, pictures=pictures))
+
+
+def closed_page(title: str, body: list[Html], *, data: Any = None, version: str, style: str = "") -> str:
+    """A whole HTML file that loads nothing.
+
+    Args:
+        title: of the window.
+        body: what stands in it.
+        data: what the script draws; without it there is no script.
+        version: of orthoscope.
+        style: rules beside those of page.css.
+    """
+    style = _part("page.css") + style
+    script = _part("page.js") if data is not None else ""
+    allowed = f"'sha256-{_hash(script)}'" if script else "'none'"
+    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{_hash(style)}'; script-src {allowed}"
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=policy),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", name="generator", content=f"orthoscope {version}"),
+        tag("title", title),
+        tag("style", raw(style)),
+    )
+    if script:
+        numbers = tag("script", raw(_json(data)), type="application/json", id="data")
+        body = [*body, numbers, tag("script", raw(script))]
+    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', body), lang='en')}\n"
 
 
 @cache
-def _template() -> Template:
-    """The page's template, everything escaped that is put into it; imported late, since most verbs make no
-    page.
-    """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("orthoscope", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("page.html.jinja")
+def _part(name: str) -> str:
+    return files("orthoscope.report").joinpath(name).read_text("utf-8")
 
 
-def _plates(evaluation: Evaluation) -> list[dict[str, object]]:
-    """Title, caption and SVG of each figure; imported late, since matplotlib takes its time."""
-    from markupsafe import Markup
-
-    from orthoscope.report.figures import to_svg
-    from orthoscope.report.plates import PLATES
-
-    return [
-        {
-            "title": p.title,
-            "caption": p.caption,
-            "wide": p.wide,
-            "svg": Markup(to_svg(p.draw(evaluation), p.name)),
-        }
-        for p in PLATES
-        if p.suits(evaluation)
-    ]
+def _hash(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
-def _shown(photograph: Photograph | None) -> dict[str, str] | None:
-    if photograph is None:
-        return None
-    from orthoscope.report.figures import photograph_uri
-
-    name, before, after = photograph
-    return {"name": name, "before": photograph_uri(before), "after": photograph_uri(after)}
+def _json(data: Any) -> str:
+    """JSON that cannot end the element it stands in."""
+    text = msgspec.json.encode(data).decode()
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")

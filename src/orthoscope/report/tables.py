@@ -32,6 +32,7 @@ __all__ = [
     "MisfitRow",
     "Parameter",
     "ViewRow",
+    "camera_line",
     "candidate_rows",
     "cards",
     "lens_name",
@@ -165,6 +166,16 @@ def parameters(calibration: Calibration) -> list[Parameter]:
         Parameter(name, *_value(value, deviations.get(name), bool(deviations)), unit, repr(float(value)))
         for name, value, unit in rows
     ]
+
+
+def camera_line(calibration: Calibration) -> str:
+    """Focal lengths and principal point with their standard deviations, one line."""
+    values = {row.name: row for row in parameters(calibration) if row.name in ("fx", "fy", "cx", "cy")}
+    told = (
+        f"{name} {row.value}" + ("" if row.deviation in (ABSENT, "fixed") else f" ± {row.deviation}")
+        for name, row in values.items()
+    )
+    return " · ".join(told)
 
 
 def lens_rows(calibration: Calibration) -> list[tuple[str, str]]:

@@ -6,13 +6,16 @@ from dataclasses import asdict
 from typing import Any
 
 from orthoscope.geometry.arrays import InputError
+from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.board import Board
+from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.kalibr_target import kalibr_target
 from orthoscope.targets.target import Target, target_of
 
 __all__ = ["TARGETS", "as_fields", "forms", "parse_target"]
 
-TARGETS: dict[str, type[Board]] = {board.kind: board for board in (Chessboard,)}
+TARGETS: dict[str, type[Board]] = {board.kind: board for board in (Chessboard, Charuco, AprilGrid)}
 
 
 def forms() -> str:
@@ -21,11 +24,13 @@ def forms() -> str:
 
 
 def parse_target(text: str) -> Target:
-    """The target of a description such as `chessboard:9x6:25mm`.
+    """The target of a description such as `chessboard:9x6:25mm`, or of Kalibr's target.yaml.
 
     Raises:
         InputError: the description is none.
     """
+    if text.strip().lower().endswith((".yaml", ".yml")):
+        return target_of(kalibr_target(text.strip()))
     kind, *fields = text.strip().split(":")
     if kind not in TARGETS:
         raise InputError(

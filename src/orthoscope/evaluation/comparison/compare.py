@@ -22,6 +22,7 @@ from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
 from orthoscope.evaluation.metrics import held_out_nce
 from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views, held_out
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.methods import METHODS
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.camera import Camera
@@ -88,6 +89,7 @@ class Comparison:
         return tuple(standing for standing in self.standings if np.isfinite(standing.held_out_px))
 
 
+@with_one_thread
 def compare(
     detections: Detections,
     entries: Sequence[Entry | str] = USUAL,

@@ -25,6 +25,7 @@ from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
 from orthoscope.fitting.held_out import FEWEST_VIEWS
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.methods.decoupled.candidates import JOINT, PAIRS, Candidates, Model
 from orthoscope.methods.decoupled.model_selection import (
     Contender,
@@ -67,6 +68,7 @@ class _Open(NamedTuple):
     fits: tuple[str, ...]
 
 
+@with_one_thread
 def decoupled(
     detections: Detections,
     *,

@@ -34,6 +34,7 @@ from orthoscope.fitting.pinhole import fit_pinhole, pinhole_start
 from orthoscope.fitting.reprojection import Estimate
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Float, InputError, ndarray
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.methods.mldc.eq7 import Eq7
 from orthoscope.methods.mldc.lens_about_centre import fit_centred_lens
 from orthoscope.solve.least_squares import Options, Status, shared_covariance, solve
@@ -69,6 +70,7 @@ class Corrected(NamedTuple):
     member: str
 
 
+@with_one_thread
 def mldc(
     detections: Detections,
     *,

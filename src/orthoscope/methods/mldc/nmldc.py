@@ -28,6 +28,7 @@ from orthoscope.fitting.pinhole import fit_pinhole
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
+from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
 from orthoscope.methods.mldc.lens_from_lines import StraightLens, fit_straight_lens
@@ -47,6 +48,7 @@ EXACT = 1e-14  # px^2: nor is it for less than this (noise-free corners)
 NEARBY = 1e-3  # px: what a lens that is a little off moves the lines by
 
 
+@with_one_thread
 def nmldc(
     detections: Detections,
     *,

@@ -7,7 +7,6 @@ figure is needed.
 from orthoscope.report.figures.board import target_misfit, target_shape
 from orthoscope.report.figures.coverage import coverage
 from orthoscope.report.figures.lens import displacement_map, distortion_curve, lens_difference
-from orthoscope.report.figures.photograph import photograph_uri
 from orthoscope.report.figures.residuals import (
     lens_misfit,
     residual_vectors,
@@ -24,7 +23,6 @@ __all__ = [
     "distortion_curve",
     "lens_difference",
     "lens_misfit",
-    "photograph_uri",
     "residual_vectors",
     "residuals_by_place",
     "residuals_by_view",

@@ -14,16 +14,18 @@ from matplotlib.figure import Figure
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.models.camera import Camera, image_border
+from orthoscope.models.camera import Camera
 from orthoscope.models.charts import GNOMONIC
 from orthoscope.models.difference import image_difference
+from orthoscope.report.data.frame_fields import ideal_image
+from orthoscope.report.data.lens_curve import along_angles, angles_shown, marks
 from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, RED, WIDTH, frame_figure, note, styled
 from orthoscope.report.figures.vector_map import vector_map
 
 __all__ = ["displacement_map", "distortion_curve", "lens_difference"]
 
-DIRECTIONS = 48  # around the axis
-BEYOND = 1.12  # the curve is drawn this much farther than the frame's farthest corner
+SAMPLES = 240  # along the curve
+COLOURS = {"seen": ORANGE, "edge": INK, "end": RED}  # of what is marked on it
 
 
 @styled
@@ -39,19 +41,18 @@ def distortion_curve(calibration: Calibration) -> Figure:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.25, 1.0))
     above.set_ylabel("distance from principal point (px)")
     below.set(xlabel="angle from the optical axis (°)", ylabel="radial displacement (px)")
-    edge = _largest_angle(camera.unproject(_outline(camera)))
-    if not np.isfinite(edge):
+    angles = angles_shown(camera, SAMPLES)
+    if not len(angles):
         note(above, "no pixel of the frame's border or inside has a ray")
         return figure
-    angles = np.linspace(0.0, min(BEYOND * edge, camera.lens.chart.reach - 1e-3), 240)
-    radius, displacement = _along_angles(camera, angles)
+    radius, displacement = along_angles(camera, angles)
     _band(above, angles, radius, "this lens")
     _ideals(above, camera, angles, float(np.nanmax(radius)))
     _band(below, angles, displacement, "")
     below.axhline(0.0, color=GREY, lw=0.9, ls=(0, (4, 3)))
     for axes in (above, below):
         axes.grid()
-        _marks(axes, calibration, angles[-1], edge)
+        _marks(axes, calibration, angles[-1])
     above.set(xlim=(0.0, np.rad2deg(angles[-1])), ylim=(0.0, 1.25 * float(np.nanmax(radius))))
     figure.legend(
         *above.get_legend_handles_labels(),
@@ -75,7 +76,7 @@ def displacement_map(calibration: Calibration) -> Figure:
         figure,
         axes,
         camera.image_size,
-        field=lambda pixels: pixels - _ideal(camera, camera.unproject(pixels)),
+        field=lambda pixels: pixels - ideal_image(camera, camera.unproject(pixels)),
         label=f"displacement from the {ideal} image (px)",
         empty="no pixel of the frame has a ray",
     )
@@ -106,33 +107,6 @@ def _principal_point(axes: Axes, camera: Camera) -> None:
         camera.intrinsics.cx, camera.intrinsics.cy, "+", color=ORANGE, ms=10, mew=1.6, label="principal point"
     )
     axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.2)
-
-
-def _ideal(camera: Camera, rays: Float[ndarray, "n 3"]) -> Float[ndarray, "n 2"]:
-    """Pixels (n,2) that the chart alone gives rays (n,3)."""
-    return camera.intrinsics.to_pixels(np.stack(camera.lens.chart.flatten(*rays.T), axis=-1))
-
-
-def _along_angles(
-    camera: Camera, angles: Float[ndarray, " a"]
-) -> tuple[Float[ndarray, "a d"], Float[ndarray, "a d"]]:
-    """For each angle and direction: distance of the image from the principal point, and how much of it the
-    lens added.
-    """
-    phi = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    rays = np.stack(
-        np.broadcast_arrays(
-            np.sin(angles[:, None]) * np.cos(phi),
-            np.sin(angles[:, None]) * np.sin(phi),
-            np.cos(angles[:, None]),
-        ),
-        axis=-1,
-    ).reshape(-1, 3)
-    centre = np.array([camera.intrinsics.cx, camera.intrinsics.cy])
-    image, ideal = camera.project(rays) - centre, _ideal(camera, rays) - centre
-    outwards = ideal / np.maximum(np.hypot(*ideal.T), 1e-12)[:, None]
-    radius, added = np.hypot(*image.T), ((image - ideal) * outwards).sum(-1)
-    return radius.reshape(len(angles), -1), added.reshape(len(angles), -1)
 
 
 def _band(axes: Axes, angles: ndarray, values: Float[ndarray, "a d"], label: str) -> None:
@@ -166,37 +140,12 @@ def _ideals(axes: Axes, camera: Camera, angles: ndarray, top: float) -> None:
     )
 
 
-def _marks(axes: Axes, calibration: Calibration, last: float, edge: float) -> None:
+def _marks(axes: Axes, calibration: Calibration, last: float) -> None:
     """Vertical lines: how far corners were seen, where the frame ends, where the lens ends."""
-    camera = calibration.camera
-    pixels = [view.pixels for view in calibration.detections.views if len(view.pixels)]
-    seen = _largest_angle(camera.unproject(np.concatenate(pixels))) if pixels else np.nan
-    whole = bool(np.isfinite(camera.unproject(image_border(camera.image_size))).all())
-    marks = [
-        (seen, ORANGE, "farthest corner seen"),
-        (edge, INK, "image corner" if whole else "last pixel with a ray"),
-        (camera.lens.field_angle, RED, "end of the lens's domain"),
-    ]
-    for angle, colour, words in marks:
+    for kind, angle, words in marks(calibration):
         if np.isfinite(angle) and angle <= last:
-            axes.axvline(np.rad2deg(angle), color=colour, lw=1.1, label=f"{words}, {np.rad2deg(angle):.1f}°")
-    if np.isfinite(seen):
-        axes.axvspan(np.rad2deg(seen), np.rad2deg(last), color=ORANGE, alpha=0.09, linewidth=0)
-
-
-def _outline(camera: Camera) -> Float[ndarray, "n 2"]:
-    """Pixels of the frame's border and of a coarse grid inside, which still has rays where an image circle
-    lies within the frame.
-    """
-    width, height = camera.image_size
-    inside = np.stack(
-        np.meshgrid(np.linspace(0, width - 1, 65), np.linspace(0, height - 1, 65)), axis=-1
-    ).reshape(-1, 2)
-    return np.concatenate([image_border(camera.image_size), inside])
-
-
-def _largest_angle(rays: Float[ndarray, "n 3"]) -> float:
-    """The largest angle from the axis (radians) among rays that are there; NaN without any."""
-    angles = np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2])
-    angles = angles[np.isfinite(angles)]
-    return float(angles.max()) if len(angles) else float("nan")
+            axes.axvline(
+                np.rad2deg(angle), color=COLOURS[kind], lw=1.1, label=f"{words}, {np.rad2deg(angle):.1f}°"
+            )
+        if kind == "seen" and np.isfinite(angle):
+            axes.axvspan(np.rad2deg(angle), np.rad2deg(last), color=ORANGE, alpha=0.09, linewidth=0)

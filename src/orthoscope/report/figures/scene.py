@@ -15,13 +15,12 @@ from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
+from orthoscope.report.data.boards import board_corners, frustum
 from orthoscope.report.figures.style import BLUE, INK, ORANGE, RED, WIDTH, styled
-from orthoscope.targets.target import Target
 
 __all__ = ["board_poses"]
 
 NUMBERED = 30  # boards; with more of them numbers would only hide each other
-WIDEST = np.deg2rad(55.0)  # half the opening of the drawn frustum; a fisheye's has no flat front
 
 
 @styled
@@ -37,8 +36,8 @@ def board_poses(evaluation: Evaluation) -> Figure:
     boards = _as_drawn(_boards(calibration))
     suspects = {name for name, _ in evaluation.suspects}
     odd = [view.image in suspects for view in calibration.detections.views]
-    frustum = _as_drawn(_frustum(calibration.camera, boards))
-    axes.add_collection3d(Line3DCollection(frustum, colors=INK, linewidths=1.1))
+    pyramid = _as_drawn(_frustum(calibration.camera, _boards(calibration)))
+    axes.add_collection3d(Line3DCollection(pyramid, colors=INK, linewidths=1.1))
     faces = [RED if is_odd else BLUE for is_odd in odd]
     if len(boards):
         axes.add_collection3d(
@@ -56,7 +55,7 @@ def board_poses(evaluation: Evaluation) -> Figure:
         if odd[i] or len(boards) <= NUMBERED:
             x, y, z = board.mean(0)
             axes.text(x, y, z, str(i + 1), color=RED if odd[i] else INK, fontsize=7, ha="center", va="center")
-    _frame_scene(axes, np.concatenate([boards.reshape(-1, 3), frustum.reshape(-1, 3)]))
+    _frame_scene(axes, np.concatenate([boards.reshape(-1, 3), pyramid.reshape(-1, 3)]))
     return figure
 
 
@@ -78,26 +77,16 @@ def _frame_scene(axes: Axes3D, points: Float[ndarray, "n 3"]) -> None:
 
 def _boards(calibration: Calibration) -> Float[ndarray, "views 4 3"]:
     """The corners of each board's outline, camera frame, metres, beginning with that of corner 0."""
-    outline = _outline(calibration.detections.target)
+    outline = board_corners(calibration.detections.target)
     return np.array([pose.apply(outline) for pose in calibration.camera_from_target]).reshape(-1, 4, 3)
-
-
-def _outline(target: Target) -> Float[ndarray, "4 3"]:
-    """The rectangle around the target's points, target frame."""
-    (x0, y0, _), (x1, y1, _) = target.points.min(0), target.points.max(0)
-    return np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]])
 
 
 def _frustum(camera: Camera, boards: Float[ndarray, "views 4 3"]) -> Float[ndarray, "8 2 3"]:
     """The edges of the pyramid that the frame sees, camera frame; its depth a third of the nearest boards'
     distance.
     """
-    width, height = camera.image_size
-    intrinsics = camera.intrinsics
-    pixels = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]) - 0.5
-    plane = np.clip(intrinsics.to_plane(pixels), -np.tan(WIDEST), np.tan(WIDEST))
     depth = 1 / 3 * float(np.quantile(np.linalg.norm(boards.mean(1), axis=-1), 0.1)) if len(boards) else 1.0
-    front = depth * np.concatenate([plane, np.ones((4, 1))], axis=-1)
+    front = frustum(camera, depth)
     return np.concatenate(
         [np.stack([np.zeros((4, 3)), front], axis=1), np.stack([front, np.roll(front, -1, axis=0)], axis=1)]
     )

@@ -1,0 +1,112 @@
+"""Finding a ChArUco board: its markers say where each corner is to a pixel or two, a saddle fit says the
+rest.
+
+No corner is interpolated between markers: what a lens bends is not on straight lines. From each marker the
+four corners of its square are foreseen by the marker's own four corners, then fitted; from the corners so
+found those next to them whose markers are hidden. Which of OpenCV's two layouts was printed is seen by the
+markers: only with the right one do all of them lie on one plane.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from orthoscope.detection.grid import grid_shape
+from orthoscope.detection.markers import Markers, find_markers, homography_of, of_one_board
+from orthoscope.detection.partial_board import filled
+from orthoscope.detection.refine import refined
+from orthoscope.detection.sight import Sight, Unseen
+from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.targets.charuco import Charuco
+
+__all__ = ["see_charuco"]
+
+ENOUGH = 0.9  # of the markers: then no other copy is looked at
+MOST_STRAY = 0.1  # of a square, from its neighbours' lines
+AROUND = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # a square's corners about its middle
+RIM = 2.0  # px: nearer to the picture's rim no corner is sought
+FEWEST = 4  # corners
+
+
+def see_charuco(grey: ndarray, board: Charuco) -> Sight | Unseen:
+    """The corners of a ChArUco board, or of the part of it that can be seen.
+
+    Args:
+        grey: (h,w) uint8.
+        board: what to look for.
+    """
+    count = len(board.marker_squares())
+    found = find_markers(grey, board.dictionary, int(ENOUGH * count))
+    markers, legacy = _in_layout(found, board)
+    if not len(markers.numbers):
+        return Unseen(f"was not found in it: none of the markers of {board.dictionary} was")
+    columns, rows = board.grid
+    grid = _foreseen(markers, board.marker_corners(legacy=legacy), columns, rows)
+    corners, good = _grown(grey, grid, board.arm)
+    if good.sum() < FEWEST:
+        return Unseen(
+            f"was not found in it: {len(markers.numbers)} of its markers were, but no corners between them"
+        )
+    ids = np.flatnonzero(good)
+    return Sight(ids, corners.reshape(-1, 2)[ids])
+
+
+def _in_layout(found: Markers, board: Charuco) -> tuple[Markers, bool]:
+    """The markers that are the board's, and whether they lie in the old layout; of two equally good, as it is
+    said.
+    """
+    best = Markers(found.numbers[:0], found.corners[:0]), board.legacy
+    for legacy in (board.legacy, not board.legacy):
+        plane = board.marker_corners(legacy=legacy)
+        known = found.numbers < len(plane)
+        markers = Markers(found.numbers[known], found.corners[known])
+        mine = of_one_board(markers, plane[markers.numbers])
+        if mine.sum() > len(best[0].numbers):
+            best = Markers(markers.numbers[mine], markers.corners[mine]), legacy
+    return best
+
+
+def _foreseen(
+    markers: Markers, plane: Float[ndarray, "k 4 2"], columns: int, rows: int
+) -> Float[ndarray, "r c 2"]:
+    """The corners of each marker's square, by the marker's own, in the mean over its neighbours; NaN for
+    others.
+    """
+    total, count = np.zeros((rows, columns, 2)), np.zeros((rows, columns, 1))
+    for number, corners in zip(markers.numbers, markers.corners, strict=True):
+        places = np.round(plane[number].mean(0) + AROUND)
+        on_board = ((places >= 0) & (places < [columns, rows])).all(1)
+        if on_board.any():
+            there = places[on_board]
+            seen = cv2.perspectiveTransform(there[None], homography_of(plane[number], corners))[0]
+            column, row = there.astype(int).T
+            total[row, column] += seen
+            count[row, column] += 1
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _grown(
+    grey: ndarray, grid: Float[ndarray, "r c 2"], arm: float
+) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"]]:
+    """Corners fitted where they are foreseen, then those next to them, until no more are found."""
+    good = np.zeros(grid.shape[:2], dtype=bool)
+    tried = good.copy()
+    start = grid
+    for _ in range(sum(grid.shape[:2])):
+        inside = ((start >= RIM) & (start <= np.array(grey.shape[::-1]) - 1 - RIM)).all(-1)
+        new = inside & ~tried
+        if not new.any():
+            break
+        tried |= new
+        row, column = np.nonzero(good | new)
+        places = np.stack([column, row], axis=1).astype(float)
+        fine = refined(grey, start[row, column], places, approach=False, arm=arm)
+        fits = fine.believed & (grid_shape(fine.pixels, places).stray < MOST_STRAY)
+        grid, good = np.full_like(grid, np.nan), np.zeros_like(good)
+        grid[row[fits], column[fits]] = fine.pixels[fits]
+        good[row[fits], column[fits]] = True
+        if good.sum() < FEWEST:
+            break
+        start = filled(grid, rounds=1)
+    return grid, good

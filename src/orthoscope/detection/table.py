@@ -1,0 +1,42 @@
+"""The detector of each kind of target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from orthoscope.detection.aprilgrid import see_aprilgrid
+from orthoscope.detection.charuco import see_charuco
+from orthoscope.detection.chessboard import see_chessboard
+from orthoscope.detection.sight import Sight, Unseen
+from orthoscope.geometry.arrays import InputError, ndarray
+from orthoscope.targets.aprilgrid import AprilGrid
+from orthoscope.targets.charuco import Charuco
+from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.target import Target
+
+__all__ = ["DETECTORS", "check_can_be_seen", "see"]
+
+DETECTORS: dict[str, Callable[[ndarray, Any], Sight | Unseen]] = {
+    Chessboard.kind: see_chessboard,
+    Charuco.kind: see_charuco,
+    AprilGrid.kind: see_aprilgrid,
+}
+
+
+def see(grey: ndarray, target: Target) -> Sight | Unseen:
+    """The target's corners in one photograph, (h,w) uint8."""
+    return DETECTORS[target.kind](grey, target.board)
+
+
+def check_can_be_seen(target: Target) -> None:
+    """Says before the first photograph that a target cannot be looked for.
+
+    Raises:
+        InputError: no detector knows its kind.
+    """
+    if target.kind not in DETECTORS:
+        raise InputError(
+            f"target {target.name!r} cannot be looked for in photographs; expected one of"
+            f" {', '.join(DETECTORS)}. Hand in corners instead."
+        )

@@ -1,0 +1,29 @@
+"""Where the camera may be trusted: its predicted error over the frame, and where that stays small."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from orthoscope.evaluation.evaluate import Evaluation
+from orthoscope.report.data.rounded import PLACE, RESIDUAL, whole
+
+__all__ = ["trust"]
+
+
+def trust(evaluation: Evaluation) -> dict[str, Any] | str:
+    """The map at infinity and at the target's distance, thousandths of a pixel at the centres of cells, and
+    the region as a polygon, tenths of a pixel.
+    """
+    error = getattr(evaluation, "error", None)
+    if error is None:
+        return "How far off the camera is could not be predicted from these photographs."
+    rows, columns = error.far.shape
+    return {
+        "rows": rows,
+        "columns": columns,
+        "far": whole(error.far.ravel(), RESIDUAL),
+        "near": whole(error.near.ravel(), RESIDUAL),
+        "limit": float(f"{error.limit_px:.3g}"),
+        "distance": float(f"{error.distance:.3g}"),
+        "region": whole(error.region.ravel(), PLACE),
+    }

@@ -1,0 +1,44 @@
+"""Photographs that the user leaves out by name: they stay in detections.json and take no part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import PurePath
+
+from orthoscope.geometry.arrays import InputError
+from orthoscope.targets.detections import Detections, SetAside
+
+__all__ = ["LEFT_OUT", "left_out"]
+
+LEFT_OUT = "left out by --without"  # the reason that such a photograph has
+SHOWN = 6  # names of photographs in an error
+
+
+def left_out(detections: Detections, names: Sequence[str]) -> Detections:
+    """The detections without these photographs, which are set aside.
+
+    Args:
+        names: of views; a file's name without its folders is enough where it is the only such one.
+    Raises:
+        InputError: there is no such photograph, or nothing would be left.
+    """
+    views = detections.views
+    known = [view.image for view in views] + [entry.image for entry in detections.set_aside]
+    out = {_named(name, known) for name in names}
+    kept = [i for i, view in enumerate(views) if view.image not in out]
+    if not kept:
+        raise InputError("--without leaves no photograph; expected some to calibrate from. Leave out fewer.")
+    aside = (SetAside(view.image, LEFT_OUT) for view in views if view.image in out)
+    return replace(detections.only(kept), set_aside=(*detections.set_aside, *aside))
+
+
+def _named(name: str, known: Sequence[str]) -> str:
+    """The photograph that is meant."""
+    if name in known:
+        return name
+    alike = [each for each in known if PurePath(each).name == PurePath(name).name]
+    if len(alike) == 1:
+        return alike[0]
+    shown = ", ".join((alike or list(known))[:SHOWN])
+    raise InputError(f"--without {name!r} names no single photograph; expected one such as {shown}.")
