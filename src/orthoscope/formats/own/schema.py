@@ -259,6 +259,17 @@ class CandidateFile(FileStruct):
         return Candidate(self.target, self.lens, held_out, error, loses, self.base, self.fit, self.views)
 
 
+# A candidate as version 0.1.0 wrote it: target, lens, held-out error, its error, what it loses.
+OldCandidate = tuple[str, str, float | None, float | None, float | None]
+
+
+def _candidate(entry: CandidateFile | OldCandidate) -> Candidate:
+    """A candidate of either form; the old one does not say its base."""
+    if isinstance(entry, CandidateFile):
+        return entry.core()
+    return Candidate(entry[0], entry[1], *(float("nan") if value is None else value for value in entry[2:]))
+
+
 class VariancesFile(FileStruct):
     noise: float
     surface: tuple[float, float]
@@ -281,7 +292,7 @@ class CalibrationFile(FileStruct, kw_only=True):
     settings: dict[str, Any]
     assumptions: list[str] = []
     parameters: float | None = None
-    candidates: list[CandidateFile] = []
+    candidates: list[CandidateFile | OldCandidate] = []
     variances: VariancesFile | None = None
     free_camera: CameraFile | None = None
     camera_from_target: list[PoseFile]
@@ -325,7 +336,7 @@ class CalibrationFile(FileStruct, kw_only=True):
             version=self.version,
             assumptions=tuple(self.assumptions),
             parameters=float("nan") if self.parameters is None else self.parameters,
-            candidates=tuple(candidate.core() for candidate in self.candidates),
+            candidates=tuple(map(_candidate, self.candidates)),
             variances=self.variances and self.variances.core(),
             free_camera=self.free_camera and self.free_camera.core(),
             **({"target_shape": self.target_shape.core()} if self.target_shape else {}),
