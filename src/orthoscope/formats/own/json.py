@@ -192,7 +192,8 @@ def _kind(content: bytes, path: str | Path) -> str:
         content.decode()
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{path} is not JSON (byte {error.start} is no UTF-8); expected a file that orthoscope wrote, such as"
+            f"{path} is not JSON (byte {error.start} is no UTF-8); expected a file that orthoscope wrote,"
+            f" such as"
             " calibration.json."
         ) from error
     try:

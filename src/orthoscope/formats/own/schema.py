@@ -267,7 +267,8 @@ def _candidate(entry: CandidateFile | OldCandidate) -> Candidate:
     """A candidate of either form; the old one does not say its base."""
     if isinstance(entry, CandidateFile):
         return entry.core()
-    return Candidate(entry[0], entry[1], *(float("nan") if value is None else value for value in entry[2:]))
+    held_out, error, loses = (float("nan") if value is None else value for value in entry[2:])
+    return Candidate(entry[0], entry[1], held_out, error, loses)
 
 
 class VariancesFile(FileStruct):
