@@ -13,12 +13,14 @@ from benchmarks.parts.shape_and_lens import shape_and_lens
 from benchmarks.parts.solving import solving
 from benchmarks.parts.starting import starting
 from benchmarks.parts.undistorting import undistorting
+from benchmarks.parts.whole_command import whole_command
 from benchmarks.peers import Peers
 from benchmarks.rows import Part
 
 __all__ = ["PARTS"]
 
 PARTS: dict[str, Callable[[Peers, Path], Part]] = {
+    "whole-command": whole_command,
     "solving": solving,
     "shape": shape_and_lens,
     "held-out": held_out,

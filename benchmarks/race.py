@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -51,21 +52,34 @@ def race(contenders: Mapping[str, Callable[[], dict[str, Any]]], *, rounds: int)
     return results
 
 
-def whole_process(command: list[str | Path], *, cwd: Path | None = None) -> dict[str, Any]:
-    """Run a command to its end as a user would: {"cpu", "wall", "out"} in seconds, or {"failed"}."""
-    before, start = os.times(), time.perf_counter()
-    try:
-        done = subprocess.run(
-            [str(part) for part in command], capture_output=True, text=True, cwd=cwd, check=False
-        )
-    except OSError as error:
-        return {"failed": f"{command[0]} cannot be run: {error.strerror}"}
-    wall, after = time.perf_counter() - start, os.times()
-    if done.returncode:
-        said = " ".join((done.stderr or done.stdout).split())
-        return {"failed": f"{Path(command[0]).name} ended with code {done.returncode}: {said[-300:]}"}
-    cpu = after.children_user + after.children_system - before.children_user - before.children_system
-    return {"cpu": cpu, "wall": wall, "out": done.stdout}
+def whole_process(
+    command: list[str | Path], *, cwd: Path | None = None, env: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Run a command to its end as a user would: {"cpu", "wall" in seconds, "memory" in MB at its peak,
+    "out"}, or {"failed"}.
+
+    Args:
+        env: the whole environment; by default this process's.
+    """
+    start = time.perf_counter()
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
+        try:
+            process = subprocess.Popen(
+                [str(part) for part in command], stdout=out, stderr=err, text=True, cwd=cwd, env=env
+            )
+        except OSError as error:
+            return {"failed": f"{command[0]} cannot be run: {error.strerror}"}
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        wall = time.perf_counter() - start
+        out.seek(0)
+        err.seek(0)
+        said, complained = out.read(), err.read()
+    if process.returncode:
+        words = " ".join((complained or said).split())
+        return {"failed": f"{Path(command[0]).name} ended with code {process.returncode}: {words[-300:]}"}
+    cpu, memory = used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0
+    return {"cpu": cpu, "wall": wall, "memory": memory, "out": said}
 
 
 ORTHOSCOPE = Path(sys.executable).with_name("orthoscope")

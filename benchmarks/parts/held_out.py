@@ -5,6 +5,7 @@ every peer.
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,6 +38,7 @@ WIDE_PEERS = [
     ("mrcal", "splined"),
 ]
 CHOSEN = "chosen by itself"
+PATIENCE = 40.0  # seconds: a peer that has taken so long over the sets so far is not asked about the others
 OURS, WIDE_OURS = (CHOSEN, "free target", "brown"), (CHOSEN, "kannala_brandt")
 JUDGED = ("opencv-left", "udacity", "sony", "bumblebee-left", "bumblebee-right", "calibrel")
 ABOUT = (
@@ -64,8 +66,9 @@ def held_out(peers: Peers, folder: Path) -> Part:
     if data is None:
         part.remarks.append("The photographs are not there; ORTHOSCOPE_DATASETS names their folder.")
         return part
+    spent: dict[tuple[str, str], float] = {}
     errors = {
-        name: _errors(part, peers, folder, name, detections, folds)
+        name: _errors(part, peers, folder, name, detections, folds, spent)
         for name, (detections, folds) in _tasks(data).items()
     }
     for name, found in errors.items():
@@ -87,9 +90,19 @@ def _tasks(data: Path) -> dict[str, tuple[Detections, list[list[int]]]]:
 
 
 def _errors(
-    part: Part, peers: Peers, folder: Path, name: str, detections: Detections, folds: list[list[int]]
+    part: Part,
+    peers: Peers,
+    folder: Path,
+    name: str,
+    detections: Detections,
+    folds: list[list[int]],
+    spent: dict[tuple[str, str], float],
 ) -> dict[tuple[str, str], _Error]:
-    """The error of every peer on one set; why one failed goes to the remarks."""
+    """The error of every peer on one set; why one failed goes to the remarks.
+
+    Args:
+        spent: seconds that each has taken so far.
+    """
     wide = name in ("fisheye-180", "babel-cube")
     near = fccm(detections, lens="kannala_brandt" if wide else "brown")
     path = write_corners(folder / f"{name}.npz", near.detections, near.camera, near.camera_from_target)
@@ -98,7 +111,12 @@ def _errors(
         *(("orthoscope", kind) for kind in (WIDE_OURS if wide else OURS)),
         *(WIDE_PEERS if wide else PEERS),
     ]:
+        if peer != "orthoscope" and spent.get((peer, kind), 0.0) > PATIENCE:
+            part.remarks.append(f"{name}, {peer} {kind}: not asked, since it took {PATIENCE:.0f} s before.")
+            continue
+        start = time.perf_counter()
         error = _error(peers.ask(peer, "held_out", path=path, kind=kind, folds=folds))
+        spent[peer, kind] = spent.get((peer, kind), 0.0) + time.perf_counter() - start
         errors[peer, kind] = error
         if error.failed and peer not in peers.missing:
             part.remarks.append(f"{name}, {peer} {kind}: {error.failed}.")

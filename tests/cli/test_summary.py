@@ -33,16 +33,29 @@ def with_outliers(evaluation: Evaluation, outliers: tuple[Outlier, ...]) -> Eval
 
 
 def test_corners_left_out_are_counted_and_their_photographs_named(evaluation: Evaluation):
-    lines = evaluation_lines(with_outliers(evaluation, OUTLIERS))
+    lines = evaluation_lines(with_outliers(evaluation, OUTLIERS), verbose=True)
     told = (
         "outliers   36 corners left out: 00.jpg (1), 01.jpg (2), 02.jpg (3), 03.jpg (4), 04.jpg (5), 05.jpg"
         " (6) and 2 more"
     )
     assert told in lines
     assert "outliers   1 corner left out: 00.jpg (1)" in evaluation_lines(
-        with_outliers(evaluation, OUTLIERS[:1])
+        with_outliers(evaluation, OUTLIERS[:1]), verbose=True
     )
 
 
 def test_where_no_corner_is_left_out_nothing_is_said(evaluation: Evaluation):
-    assert not [line for line in evaluation_lines(evaluation) if line.startswith("outliers")]
+    lines = evaluation_lines(evaluation, verbose=True)
+    assert not [line for line in lines if line.startswith("outliers")]
+
+
+def test_three_lines_say_what_matters_and_the_verdict_is_the_first(evaluation: Evaluation):
+    lines = evaluation_lines(with_outliers(evaluation, OUTLIERS))
+    assert [line.split()[0] for line in lines] == ["verdict", "camera", "photos"]
+    assert lines[2].endswith("36 corners left out; " + lines[2].split("; ")[-1])
+    assert not any(word in line for line in lines for word in ("NCE", "F ", "held out"))
+
+
+def test_who_wants_every_figure_gets_it(evaluation: Evaluation):
+    words = {line.split()[0] for line in evaluation_lines(evaluation, verbose=True)}
+    assert {"off", "rms", "held", "NCE", "misfit", "agreement", "lens"} <= words

@@ -52,18 +52,9 @@ def test_calibrate_writes_what_it_says_and_finds_the_camera(calibrated, scene):
 def test_calibrate_prints_a_summary_of_a_few_lines(run, photos, tmp_path):
     told = run("calibrate", photos, "--target", TARGET, "--no-report", "-o", tmp_path)
     assert told.code == 0
-    for word in (
-        "views      10 used, 0 set aside; 540 corners",
-        "rms ",
-        "held out",
-        "NCE",
-        "fx",
-        "±",
-        "verdict",
-        "wrote",
-    ):
-        assert word in told.out
-    assert len(told.out.splitlines()) < 14
+    lines = told.out.splitlines()
+    assert [line.split()[0] for line in lines] == ["verdict", "camera", "photos", "wrote"]
+    assert "10 used, 540 corners" in lines[2]
 
 
 @pytest.mark.slow

@@ -38,6 +38,8 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @options.lens
 @options.method
 @options.shape
+@options.base
+@options.fit
 @options.skew
 @options.loss
 @options.image_size
@@ -69,6 +71,7 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
 @options.keep
 @click.option("--report/--no-report", default=True, help="Whether to write OUT/report.html.")
+@options.verbose
 @options.as_json
 def calibrate(photos: tuple[str, ...], **settings: Any) -> None:
     """Calibrate a camera from photographs of a flat target."""
@@ -83,6 +86,8 @@ def calibrate_into(
     lens: str = "auto",
     method: str = "decoupled",
     shape: str | None = None,
+    base: str | None = None,
+    fit: str | None = None,
     skew: bool = False,
     loss: str | None = None,
     image_size: tuple[int, int] | None = None,
@@ -94,6 +99,7 @@ def calibrate_into(
     undistort: bool = False,
     keep: str = "all",
     report: bool = True,
+    verbose: bool = False,
     as_json: bool = False,
 ) -> Any:
     """The main job; prints the summary and returns the evaluation."""
@@ -112,7 +118,15 @@ def calibrate_into(
     check_folder(out)
     lenses = _lenses_of(export)
     among = lenses if "among" in settings_of(method) else ()
-    given = {"lens": lens, "skew": skew, "target": shape, "loss": loss, "among": among or None}
+    given = {
+        "lens": lens,
+        "skew": skew,
+        "target": shape,
+        "base": base,
+        "fit": fit,
+        "loss": loss,
+        "among": among or None,
+    }
     given = {name: value for name, value in given.items() if value is not None}
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         detections, files = detections_from(
@@ -138,7 +152,11 @@ def calibrate_into(
     if as_json:
         click.echo(text_of(evaluation), nl=False)
     else:
-        click.echo("\n".join([*evaluation_lines(evaluation), "wrote      " + ", ".join(map(str, written))]))
+        click.echo(
+            "\n".join(
+                [*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written))]
+            )
+        )
     return evaluation
 
 

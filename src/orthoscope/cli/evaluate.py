@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from orthoscope.cli import options
+
+if TYPE_CHECKING:
+    from orthoscope.evaluation.same_board import SameBoard
 
 __all__ = ["evaluate"]
 
@@ -14,13 +18,14 @@ EXAMPLE = """\b
 Examples:
   $ orthoscope evaluate camera/calibration.json
   $ orthoscope evaluate camera/calibration.json --on other_photos/
-  views      5 used; 270 corners
-  rms        0.158 px per point, camera fixed, poses fitted
-  NCE        0.357 (1 is what rounding to whole pixels would give)
+  off by     0.158 px per corner, the camera fixed, poses fitted
+  photos     5 used, 0 set aside; 270 corners
+  board      the one of the calibration: 0.158 px with the shape found there, 0.241 without; the shape found
+  there is used
   $ orthoscope evaluate camera_info.yaml --on photos/ --target chessboard:9x6:25mm
 
 \b
-Other photographs show the calibration's own board, whose estimated shape is used;
+Whether other photographs show the board of the calibration is found out by its shape;
 with --target they show that one, taken as it is said to be.
 """
 
@@ -39,6 +44,7 @@ with --target they show that one, taken as it is said to be.
 @options.folds_anew
 @options.jobs
 @options.cluster
+@options.verbose
 @options.as_json
 def evaluate(
     calibration: str,
@@ -48,6 +54,7 @@ def evaluate(
     folds: int | None,
     jobs: int | None,
     cluster: str | None,
+    verbose: bool,
     as_json: bool,
 ) -> None:
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
@@ -57,6 +64,7 @@ def evaluate(
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, to_json
     from orthoscope.evaluation.evaluate import evaluate_on
+    from orthoscope.evaluation.same_board import same_board
     from orthoscope.fitting.calibration import Calibration
     from orthoscope.formats.load import load_source
     from orthoscope.formats.own.json import text_of
@@ -75,7 +83,10 @@ def evaluate(
     if not others or loaded is None:
         evaluation = judged(path, folds=folds, jobs=jobs, cluster=cluster)
         click.echo(
-            text_of(evaluation) if as_json else "\n".join(evaluation_lines(evaluation)) + "\n", nl=False
+            text_of(evaluation)
+            if as_json
+            else "\n".join(evaluation_lines(evaluation, verbose=verbose)) + "\n",
+            nl=False,
         )
         return
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
@@ -83,30 +94,48 @@ def evaluate(
         detections, _ = detections_from(
             others, board, image_size=image_size, executor=executor, progress=progress
         )
-    shape = (
-        loaded.target_shape if isinstance(loaded, Calibration) and not target else None
-    )  # another board has another shape
-    test = evaluate_on(loaded.camera, detections, shape=shape)
+    test = evaluate_on(loaded.camera, detections)
+    board = None
+    if isinstance(loaded, Calibration) and not target and loaded.target_shape.kind != "flat":
+        board = same_board(loaded.camera, loaded.target_shape, test.detections)
+        if board.same:
+            test = evaluate_on(loaded.camera, detections, shape=loaded.target_shape)
     if as_json:
         rejected = [{"name": entry.image, "reason": entry.reason} for entry in test.detections.set_aside]
         views = [
             {"name": view.image, "rms_px": rms}
             for view, rms in zip(test.detections.views, test.view_rms_px, strict=True)
         ]
-        click.echo(
-            to_json(
-                {
-                    "rms_px": test.rms_px,
-                    "nce": test.nce,
-                    "corners": test.detections.corners,
-                    "views": views,
-                    "views_rejected": rejected,
-                }
-            )
-        )
+        numbers = {
+            "rms_px": test.rms_px,
+            "nce": test.nce,
+            "corners": test.detections.corners,
+            "same_board": board and board._asdict(),
+            "views": views,
+            "views_rejected": rejected,
+        }
+        click.echo(to_json(numbers))
         return
-    click.echo(f"views      {len(test.detections.views)} used; {test.detections.corners} corners")
-    for entry in test.detections.set_aside:
-        click.echo(f"           {entry.image}: {entry.reason}")
-    click.echo(f"rms        {test.rms_px:.3f} px per point, camera fixed, poses fitted")
-    click.echo(f"NCE        {test.nce:.3f} (1 is what rounding to whole pixels would give)")
+    click.echo(f"off by     {test.rms_px:.3f} px per corner, the camera fixed, poses fitted")
+    aside = test.detections.set_aside
+    click.echo(
+        f"photos     {len(test.detections.views)} used, {len(aside)} set aside; {test.detections.corners} corners"
+    )
+    if board:
+        click.echo(f"board      {_board_line(board)}")
+    if verbose:
+        for entry in aside:
+            click.echo(f"set aside  {entry.image}: {entry.reason}")
+        click.echo(f"NCE        {test.nce:.3f} (1 is what rounding to whole pixels would give)")
+
+
+def _board_line(board: SameBoard) -> str:
+    """Whether it is the board that the camera was calibrated with, and how that shows."""
+    which = "the one of the calibration" if board.same else "another than that of the calibration"
+    taken = (
+        "the shape found there is used"
+        if board.same
+        else "its corners are taken to be where they are said to be"
+    )
+    figures = f"{board.learnt_px:.3f} px with the shape found there, {board.said_px:.3f} without"
+    return f"{'' if board.sure else 'perhaps '}{which}: {figures}; {taken}"

@@ -13,10 +13,12 @@ from click.shell_completion import CompletionItem
 __all__ = [
     "another_size",
     "as_json",
+    "base",
     "calibration_file",
     "camera_at_another_size",
     "camera_file",
     "cluster",
+    "fit",
     "folds",
     "folds_anew",
     "image_size",
@@ -30,6 +32,7 @@ __all__ = [
     "skew",
     "target",
     "tool_settings",
+    "verbose",
 ]
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -178,6 +181,22 @@ shape: Decorator = click.option(
         " (each corner by itself); by default what foresees best."
     ),
 )
+base: Decorator = click.option(
+    "--base",
+    metavar="NAME",
+    help=(
+        "The formula under the free lens, for decoupled: brown, kannala_brandt, rational or another; by default"
+        " what foresees best of these three."
+    ),
+)
+fit: Decorator = click.option(
+    "--fit",
+    metavar="HOW",
+    help=(
+        "How decoupled fits a formula that --lens or --export asks for: joint (with poses and target) or pairs"
+        " (to what the free lens found); by default what foresees best."
+    ),
+)
 skew: Decorator = click.option("--skew", is_flag=True, help="Let the pixel axes be oblique.")
 loss: Decorator = click.option(
     "--loss",
@@ -228,4 +247,7 @@ as_json: Decorator = click.option(
 )
 calibration_file: Decorator = click.argument(
     "calibration", type=click.Path(path_type=Path), metavar="CALIBRATION.json"
+)
+verbose: Decorator = click.option(
+    "-v", "--verbose", is_flag=True, help="Print every figure that was found, and what was left out."
 )

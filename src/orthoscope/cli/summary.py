@@ -19,20 +19,57 @@ __all__ = ["camera_numbers", "evaluation_lines", "to_json"]
 SHOWN = 6  # photographs set aside that are listed one by one
 
 
-def evaluation_lines(evaluation: Evaluation) -> list[str]:
-    """The summary: views, errors, camera with standard deviations, warnings, verdict."""
-    from orthoscope.geometry.numbers import with_error
+def evaluation_lines(evaluation: Evaluation, *, verbose: bool = False) -> list[str]:
+    """The summary: the verdict, the camera, the photographs.
+
+    Args:
+        verbose: all that was found out as well.
+    """
+    calibration = evaluation.calibration
+    lines = [
+        f"verdict    {evaluation.verdict}",
+        f"camera     {_camera_line(calibration)}",
+        f"photos     {_photographs_line(evaluation)}",
+    ]
+    return [*lines, *_details(evaluation)] if verbose else lines
+
+
+def _camera_line(calibration: Calibration) -> str:
+    """K with standard deviations, and the lens's name."""
     from orthoscope.models.lenses import lens_name
 
+    camera, deviations = calibration.camera, calibration.uncertainty.deviations
+    values = dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.intrinsics.as_tuple(), strict=True))
+    told = [_number(name, value, deviations) for name, value in values.items() if value or name in deviations]
+    return "  ".join([*told, f"lens {lens_name(camera.lens)}"])
+
+
+def _photographs_line(evaluation: Evaluation) -> str:
+    """How many there are, what was left out, and what the camera misses on those that it was not made from."""
+    detections = evaluation.calibration.detections
+    aside, outliers = len(detections.set_aside), len(detections.outliers)
+    parts = [f"{len(detections.views)} used, {detections.corners} corners"]
+    parts += [f"{aside} set aside"] if aside else []
+    parts += [f"{outliers} corner{'s' if outliers > 1 else ''} left out"] if outliers else []
+    if not math.isnan(evaluation.held_out_rms_px):
+        parts.append(f"corners missed by {evaluation.held_out_rms_px:.2g} px where a photograph was not used")
+    return "; ".join(parts) + (" (--verbose says which)" if aside or outliers else "")
+
+
+def _details(evaluation: Evaluation) -> list[str]:
+    """Figures for experts, and everything one by one."""
+    from orthoscope.geometry.numbers import with_error
+
     calibration = evaluation.calibration
-    detections, camera = calibration.detections, calibration.camera
-    aside = detections.set_aside
-    lines = [f"views      {len(detections.views)} used, {len(aside)} set aside; {detections.corners} corners"]
-    lines += [f"           {entry.image}: {entry.reason}" for entry in aside[:SHOWN]]
+    detections, camera, aside = calibration.detections, calibration.camera, calibration.detections.set_aside
+    deviations = calibration.uncertainty.deviations
+    lines = [f"set aside  {entry.image}: {entry.reason}" for entry in aside[:SHOWN]]
     lines += (
         [f"           and {len(aside) - SHOWN} more, all in detections.json"] if len(aside) > SHOWN else []
     )
     lines += _outlier_lines(detections.outliers)
+    lines += [f"suspect    {image}: {reason}" for image, reason in evaluation.suspects]
+    lines += _error_lines(evaluation)
     lines.append(
         f"rms        {evaluation.rms_px:.3f} px per point (median {evaluation.median_px:.3f}, largest"
         f" {evaluation.largest_px:.2f})"
@@ -44,21 +81,16 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
         )
     lines.append(f"NCE        {evaluation.nce:.3f} (1 is what rounding to whole pixels would give)")
     lines.append(f"misfit     {_misfit_line(evaluation.misfit.target.test, evaluation.misfit.lens.test)}")
-    deviations = calibration.uncertainty.deviations
-    values = dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.intrinsics.as_tuple(), strict=True))
-    lines.append(
-        "camera     "
-        + "  ".join(
-            _number(name, value, deviations) for name, value in values.items() if value or name in deviations
-        )
-    )
+    found = evaluation.disagreement
+    if not math.isnan(found.f2):
+        lines.append(f"agreement  of the views on one camera: F {found.f2:.1f}, p {found.p_value:.1g}")
     coefficients = dict(zip(camera.lens.names(), camera.lens.coefficients, strict=True))
     told = "  ".join(
         _number(name, value, deviations)
         for name, value in coefficients.items()
         if value or name in deviations
     )
-    lines.append(f"lens       {lens_name(camera.lens)}  {told}")
+    lines.append(f"lens       {told}")
     if camera.lens_frame:
         centre = {"centre_x": camera.lens_frame.cx, "centre_y": camera.lens_frame.cy}
         lines.append(
@@ -66,8 +98,21 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
             + "  ".join(_number(name, value, deviations) for name, value in centre.items())
         )
     lines += _choice_lines(calibration)
-    lines += [f"warning    {warning}" for warning in evaluation.warnings]
-    return [*lines, f"verdict    {evaluation.verdict}"]
+    return lines + [f"assumed    {sentence}" for sentence in evaluation.warnings]
+
+
+def _error_lines(evaluation: Evaluation) -> list[str]:
+    """How far off the camera is, and what makes it up."""
+    error = evaluation.error
+    if error is None:
+        return []
+    return [
+        f"off by     {error.seen_px:.3f} px where corners were seen, {error.frame_px:.3f} over the frame;"
+        f" at the target's distance {error.near_seen_px:.3f}, {error.near_frame_px:.3f}",
+        f"           of it {error.model_px:.3f} by independent errors of corners, {error.alike_px:.3f} with"
+        f" errors alike in a view, {error.views_px:.3f} by leaving views out, {error.bias_px:.3f} against the"
+        " richest model",
+    ]
 
 
 def _choice_lines(calibration: Calibration) -> list[str]:
@@ -86,8 +131,8 @@ def _choice_lines(calibration: Calibration) -> list[str]:
             f"loses {other.loses_px:.3f} px" if other.loses_px > 0 else f"would gain {-other.loses_px:.3f} px"
         )
         lines.append(
-            f"choice     target {settings['target']}, lens {settings['lens']}; next target {other.target},"
-            f" lens {other.lens} {how} held out"
+            f"choice     target {settings['target']}, lens {settings['lens']}, base {settings['base']}; next target"
+            f" {other.target}, lens {other.lens}, base {other.base} {how} held out"
         )
     return lines
 

@@ -9,11 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.geometry.arrays import Bool, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.targets.detections import Detections
 
-__all__ = ["COVERAGE_GRID", "cells_with_rays", "corners_by_cell", "emptiest_place", "share_covered"]
+__all__ = [
+    "COVERAGE_GRID",
+    "cells_with_rays",
+    "corners_by_cell",
+    "emptiest_place",
+    "place_of",
+    "share_covered",
+]
 
 COVERAGE_GRID = (8, 6)  # cells across and down by which the frame is said to be covered
 PLACES = (("at the top", "in the middle", "at the bottom"), ("left", "", "right"))
@@ -46,6 +53,17 @@ def emptiest_place(detections: Detections) -> str:
     """The ninth of the frame with the fewest corners, in words."""
     counts = corners_by_cell(detections, (3, 3))
     row, column = np.unravel_index(int(np.argmin(counts)), counts.shape)
+    return _in_words(int(row), int(column))
+
+
+def place_of(pixels: Float[ndarray, "n 2"], image_size: tuple[int, int]) -> str:
+    """The ninth of the frame where most of these pixels are, in words."""
+    thirds = np.clip((3.0 * (pixels + 0.5) / np.array(image_size)).astype(np.int64), 0, 2)
+    row, column = np.divmod(int(np.bincount(3 * thirds[:, 1] + thirds[:, 0], minlength=9).argmax()), 3)
+    return _in_words(int(row), int(column))
+
+
+def _in_words(row: int, column: int) -> str:
     return " ".join(word for word in (PLACES[0][row], PLACES[1][column]) if word)
 
 

@@ -1,8 +1,8 @@
-"""How good a calibration is: its numbers, and the sentences that verdict.py makes of them.
+"""How good a calibration is: its numbers, and the verdict that is made of them.
 
-The error that counts is that of photographs which were held out; rms, NCE, coverage and the views that do not
-belong stand beside it. What held-out photographs cannot show, a target or a formula that is wrong in all of
-them, the misfit tests find.
+The error that counts is that of the camera (camera_error.py). Held-out error is the check on it, and cannot
+see what all photographs share: a target or a formula that is wrong, which the misfit tests find, and
+photographs that do not agree on one camera.
 """
 
 from __future__ import annotations
@@ -10,46 +10,58 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from orthoscope.evaluation.camera_error import CameraError
 from orthoscope.evaluation.coverage import share_covered
+from orthoscope.evaluation.disagreement import AGREED, Disagreement, disagreement
+from orthoscope.evaluation.groups import Groups, two_groups
 from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
-from orthoscope.evaluation.verdict import (
-    Findings,
-    ViewError,
-    corners_beyond,
-    suspects_among,
-    verdict_on,
-    warnings_about,
-)
+from orthoscope.evaluation.reference_fit import ReferenceFit, reference_fit
+from orthoscope.evaluation.suspects import ViewError
+from orthoscope.evaluation.verdict.facts import Findings, situation_of
+from orthoscope.evaluation.verdict.situation import NOTHING_KNOWN, Situation
+from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.held_out import HeldOut, held_out
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
-from orthoscope.geometry.arrays import InputError, ndarray
+from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.methods import METHODS
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
-__all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on"]
+__all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on", "examine"]
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """What `evaluate` finds out about a calibration.
 
-    rms_px, median_px, largest_px: of |residual| over the corners it was made from. held_out_rms_px: over all
-    corners, each from a fold that did not use its photograph; held_out_error_px: its standard error over
-    views; NaN where there were too few views. nce: of held-out views where there are any, else of the
-    training views. misfit: of the target and of the lens (misfit.py). coverage: share of the frame's cells
-    where corners were seen (coverage.py). suspects: views and why they do not belong. warnings: sentences.
-    verdict: one sentence. held_out_residuals: one array (n,2) for each view, NaN where not done.
+    Args:
+        calibration: that was evaluated.
+        rms_px, median_px, largest_px: of |residual| over the corners that it was made from.
+        held_out_rms_px: over all corners, each by a camera that did not use its photograph; NaN where there
+            were too few.
+        held_out_error_px: its standard error over photographs.
+        nce: of held-out photographs where there are any, else of those that were used.
+        misfit: of the target and of the lens (misfit.py).
+        coverage: share of the frame's cells where corners were seen (coverage.py).
+        views: what each photograph's error is.
+        held_out_residuals: one array (n,2) for each photograph, NaN where not done.
+        suspects: photographs that do not belong, with what is wrong.
+        warnings: what else should be known, a sentence each.
+        verdict: the grade, what limits it, and what to do.
+        error: how far off the camera is (camera_error.py); None where nothing tells.
+        disagreement: whether the photographs agree on one camera (disagreement.py).
+        groups: of photographs of two cameras; None where there is one.
+        situation: the facts that the verdict is made from.
     """
 
     calibration: Calibration
@@ -65,7 +77,20 @@ class Evaluation:
     held_out_residuals: tuple[ndarray, ...]
     suspects: tuple[tuple[str, str], ...]
     warnings: tuple[str, ...]
-    verdict: str
+    verdict: Verdict
+    error: CameraError | None = None
+    disagreement: Disagreement = AGREED
+    groups: Groups | None = None
+    situation: Situation = NOTHING_KNOWN
+
+    def trusted(self, pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
+        """Which places of the image lie where the camera may be used; none where nothing tells how far off it
+        is.
+
+        Args:
+            pixels: (n,2) of the camera's image.
+        """
+        return self.error.trusted(pixels) if self.error else np.zeros(len(pixels), dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,14 +152,8 @@ def evaluate(
         ViewError(view.image, len(view.ids), rms(e), rms(e_unseen))
         for view, e, e_unseen in zip(detections.views, residuals, unseen.residuals, strict=True)
     )
-    found = Findings(
-        calibration,
-        unseen,
-        misfit(calibration),
-        share_covered(calibration),
-        suspects_among(views),
-        corners_beyond(calibration),
-    )
+    found = examine(calibration, views)
+    situation = situation_of(found)
     return Evaluation(
         calibration=calibration,
         rms_px=rms(np.concatenate(residuals)),
@@ -144,13 +163,42 @@ def evaluate(
         held_out_error_px=unseen.standard_error_px,
         nce=_nce(calibration, unseen),
         misfit=found.misfit,
-        coverage=found.coverage,
+        coverage=share_covered(calibration),
         views=views,
         held_out_residuals=unseen.residuals,
-        suspects=found.suspects,
-        warnings=warnings_about(found),
-        verdict=verdict_on(found),
+        suspects=situation.suspects,
+        warnings=calibration.assumptions,
+        verdict=verdict_on(situation),
+        error=found.reference.error if found.reference else None,
+        disagreement=replace(found.disagreement, wishes=None),
+        groups=found.groups,
+        situation=situation,
     )
+
+
+def examine(calibration: Calibration, views: tuple[ViewError, ...] | None = None) -> Findings:
+    """What tests find out about a calibration; no photograph is held out.
+
+    Args:
+        views: what each photograph's error is, where that is known; found out where not.
+    """
+    if views is None:
+        nothing = float("nan")
+        pairs = zip(calibration.detections.views, calibration.residuals(), strict=True)
+        views = tuple(ViewError(view.image, len(view.ids), rms(e), nothing) for view, e in pairs)
+    reference = reference_fit(calibration)
+    differ, groups = _agreement(reference, calibration.detections)
+    return Findings(calibration, views, misfit(calibration), reference, differ, groups)
+
+
+def _agreement(reference: ReferenceFit | None, detections: Detections) -> tuple[Disagreement, Groups | None]:
+    """Whether the photographs agree on one camera, and if not, which of them belong together."""
+    if reference is None:
+        return AGREED, None
+    found = disagreement(reference.known, detections)
+    if not found.certain:
+        return found, None
+    return found, two_groups(reference.known, found, reference.left_out, detections, base=reference.base)
 
 
 def _nce(calibration: Calibration, unseen: HeldOut) -> float:

@@ -158,7 +158,7 @@ def _cells(row: Row) -> list[Content]:
 
 
 def _entries(comparison: Comparison) -> list[dict[str, Any]]:
-    """What page.js draws of each entry."""
+    """What the script draws of each entry."""
     return [
         {
             "name": each.entry.name,

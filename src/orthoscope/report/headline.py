@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from orthoscope.evaluation.evaluate import Evaluation
 
 __all__ = ["Headline", "headline", "next_steps"]
@@ -38,19 +36,11 @@ class Headline(NamedTuple):
 
 def headline(evaluation: Evaluation) -> Headline:
     """The verdict as the page opens with it."""
-    grade = _grade(evaluation)
-    look, sign = LOOKS[grade]
-    return Headline(grade, look, sign, str(evaluation.verdict))
+    verdict = evaluation.verdict
+    look, sign = LOOKS[verdict.grade]
+    return Headline(str(verdict.grade), look, sign, f"{verdict.far} {verdict.limit}".strip())
 
 
 def next_steps(evaluation: Evaluation) -> list[str]:
-    """What to do now, most urgent first: what the evaluation advises, or how the camera is put to use."""
-    return [*evaluation.warnings[:3]]
-
-
-def _grade(evaluation: Evaluation) -> str:
-    """The evaluation's own."""
-    verdict = str(evaluation.verdict)
-    if verdict.startswith("Do not trust") or not np.isfinite(evaluation.held_out_rms_px):
-        return "do not use"
-    return "usable" if evaluation.warnings else "good"
+    """What to do now, most urgent first: what the evaluation advises."""
+    return [evaluation.verdict.advice] if evaluation.verdict.advice else []

@@ -1,7 +1,7 @@
 """The report: one HTML file that needs no network and draws itself, from an evaluation.
 
-Words and tables are HTML as they stand; the numbers of the figures go in as JSON, and page.js, the one
-script, draws them. A policy in the page itself forbids the browser to load anything, and to run or to style
+Words and tables are HTML as they stand; the numbers of the figures go in as JSON, and the one script
+(script/) draws them. A policy in the page itself forbids the browser to load anything, and to run or to style
 by anything but what has the hash of our own script and style. The same evaluation gives the same bytes:
 nothing of the day or the machine goes in.
 """
@@ -29,6 +29,25 @@ from orthoscope.report.pictures import Pictures
 from orthoscope.targets.left_out import LEFT_OUT
 
 __all__ = ["closed_page", "report_page", "write_report"]
+
+SCRIPT = (  # files in script/; the last begins
+    "data",
+    "state",
+    "plot",
+    "drawing",
+    "residuals",
+    "fields",
+    "trust",
+    "lens_curve",
+    "solid",
+    "boards",
+    "target",
+    "choice",
+    "comparison",
+    "photographs",
+    "tabs",
+    "all",
+)
 
 
 def report_page(evaluation: Evaluation, *, pictures: Pictures | None = None) -> str:
@@ -95,7 +114,7 @@ def closed_page(title: str, body: list[Html], *, data: Any = None, version: str,
         style: rules beside those of page.css.
     """
     style = _part("page.css") + style
-    script = _part("page.js") if data is not None else ""
+    script = _script() if data is not None else ""
     allowed = f"'sha256-{_hash(script)}'" if script else "'none'"
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{_hash(style)}'; script-src {allowed}"
     head = tag(
@@ -111,6 +130,13 @@ def closed_page(title: str, body: list[Html], *, data: Any = None, version: str,
         numbers = tag("script", raw(_json(data)), type="application/json", id="data")
         body = [*body, numbers, tag("script", raw(script))]
     return f"<!DOCTYPE html>\n{tag('html', head, tag('body', body), lang='en')}\n"
+
+
+@cache
+def _script() -> str:
+    """The one script: its parts in their order, of which each uses what stands before it."""
+    parts = "\n".join(_part(f"script/{name}.js") for name in SCRIPT)
+    return f'"use strict";\n(() => {{\n{parts}}})();\n'
 
 
 @cache

@@ -1,7 +1,7 @@
 """The page's figures in their order: what each is called, how to read it, and the numbers that it shows.
 
-A panel's `data` is what page.js draws under the panel's name, or a sentence that says why there is nothing to
-draw; the page then has the sentence in the place of the figure.
+A panel's `data` is what the script draws under the panel's name, or a sentence that says why there is nothing
+to draw; the page then has the sentence in the place of the figure.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Panel(NamedTuple):
     """A figure of the page.
 
     Args:
-        name: in page.js, and the element's id.
+        name: in the script, and the element's id.
         title, caption: what it shows, and how to take it.
         label: what it shows, for readers who hear the page.
         data: its numbers, or why there are none; empty where it draws the views alone.

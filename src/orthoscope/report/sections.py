@@ -1,6 +1,6 @@
 """The page's parts in words and tables, from top to bottom; each an element.
 
-What page.js draws has its place here, an element with `data-panel`, and stays hidden where there is no
+What the script draws has its place here, an element with `data-panel`, and stays hidden where there is no
 script.
 """
 
@@ -243,10 +243,10 @@ def figures(found: dict[str, Any]) -> Html:
 
 
 def figure(name: str, title: str, caption: str, label: str, *, wide: bool = False) -> Html:
-    """The place of a figure that page.js draws.
+    """The place of a figure that the script draws.
 
     Args:
-        name: of the figure, as page.js knows it.
+        name: of the figure, as the script knows it.
         label: what it shows, for readers who hear the page.
         wide: it spans both columns.
     """

@@ -103,12 +103,14 @@ class MisfitRow:
 
 @dataclass(frozen=True)
 class CandidateRow:
-    """A row of what was tried: target shape, lens, held-out error, its standard error and what it loses
-    against the one taken, px.
+    """A row of what was tried: target shape, lens and how it was fitted, held-out error, its standard error
+    and what it loses against the one taken, px; how many views could judge it.
     """
 
     target: str
     lens: str
+    fit: str
+    views: str
     held_out: str
     standard_error: str
     loses: str
@@ -226,7 +228,11 @@ def candidate_rows(calibration: Calibration) -> list[CandidateRow]:
     for one in calibration.candidates:
         value, error = value_with_deviation(one.held_out_px, one.standard_error_px)
         loses = "taken" if one.loses_px == 0.0 else pixels(one.loses_px)
-        rows.append(CandidateRow(one.target, one.lens, value, error, loses))
+        over = f" over {one.base}" if one.base and one.base != one.lens and one.fit == "joint" else ""
+        how = {"joint": "with the poses", "pairs": "from pairs"}[one.fit]
+        rows.append(
+            CandidateRow(one.target, one.lens + over, how, str(one.views or ABSENT), value, error, loses)
+        )
     return rows
 
 

@@ -27,8 +27,8 @@ from helpers.boards import (
     thinned,
 )
 from helpers.real_sets import classic
+from orthoscope.evaluation.misfit.f_test import is_misfit
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
-from orthoscope.evaluation.verdict import is_misfit
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm
@@ -150,7 +150,9 @@ def test_what_a_fit_takes_away_does_not_matter():
     assert_allclose(
         before.target.test.f, after.target.test.f, rtol=5e-3
     )  # the second order of a fit to 0.2 px
-    assert_allclose(before.lens.test.f, after.lens.test.f, rtol=5e-3)
+    # the terms of any lens are all but those of the formula: what is left of them, the second order moves
+    # more
+    assert_allclose(before.lens.test.f, after.lens.test.f, rtol=2e-2)
 
 
 def test_degrees_of_freedom_are_counted():
@@ -279,6 +281,15 @@ def test_a_lens_formula_that_is_too_small_is_found_and_the_target_is_not_blamed_
     found = misfit(fccm(perfect(camera, 20, seed)[1], lens=lens))
     assert is_misfit(found.lens.test, 20)
     assert not is_misfit(found.target.test, 20)
+
+
+@pytest.mark.parametrize(("seed", "views", "noise_px"), [(0, 15, 0.1), (1, 8, 0.1), (2, 15, 0.03)])
+def test_a_decentering_that_was_left_out_is_not_blamed_on_the_target(seed: int, views: int, noise_px: float):
+    camera = replace(NARROW, lens=replace(NARROW.lens, p1=0.006, p2=-0.004))
+    found = misfit(fccm(perfect(camera, views, seed, noise_px=noise_px)[1], lens="brown:k1,k2"))
+    assert is_misfit(found.lens.test, views)
+    assert not is_misfit(found.target.test, views)
+    assert found.target.test.f < 1.5  # chance gives 1
 
 
 def test_the_cells_show_as_much_as_the_test_says():

@@ -17,8 +17,14 @@ from orthoscope.evaluation.misfit.f_distribution import f_survival
 from orthoscope.evaluation.misfit.whitening import FAINT, Whitening
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["Agreement", "MisfitTest", "agreement"]
+__all__ = ["Agreement", "MisfitTest", "agreement", "is_misfit"]
 
+SURE = (
+    0.01  # p-value of a misfit: one perfect set in a hundred is blamed for its target, and one for its lens
+)
+SURE_OVER_VIEWS = 0.05  # or, with too few views to get there, the least p-value that they can give
+TELLING = 0.25  # of the noise: a misfit that is smaller adds less than a thirtieth to the error
+NEGLIGIBLE = 0.01  # px: no misfit that is smaller matters to anyone
 FEWEST_VIEWS = 3  # with fewer, "the same in all views" means nothing
 FEWEST_WITHIN = 10  # degrees of freedom left for the noise
 ALL_SIGNS = 11  # views up to which every combination of signs is tried; with more, as many at random
@@ -44,6 +50,12 @@ class MisfitTest:
     noise_px: float
 
 
+def is_misfit(test: MisfitTest, views: int) -> bool:
+    """Whether a misfit is certain, by the F test and by the vote of the views, and large enough to matter."""
+    certain = test.p_value < SURE and test.p_over_views <= max(SURE_OVER_VIEWS, 2.0 ** (1 - views))
+    return certain and test.systematic_px > max(TELLING * test.noise_px, NEGLIGIBLE)
+
+
 class Agreement(NamedTuple):
     """What `agreement` finds: the test, and the unknowns (columns,) of the tested block, their noise shrunk
     away.
@@ -53,14 +65,14 @@ class Agreement(NamedTuple):
     unknowns: ndarray
 
 
-def agreement(columns: Columns, whole: Whitening, tested: int) -> Agreement:
-    """Test one block of columns with the other blocks, and the poses, granted; NaN, and unknowns 0, where the
+def agreement(columns: Columns, whole: Whitening, tested: tuple[int, ...]) -> Agreement:
+    """Test blocks of columns with the other blocks, and the poses, granted; NaN, and unknowns 0, where the
     views do not suffice.
 
-    whole: of all the columns' gram matrix.
+    whole: of all the columns' gram matrix.  tested: numbers of the blocks, side by side.
     """
-    granted = [i for i in range(len(columns.blocks)) if i != tested]
-    A, B = np.concatenate([columns.places[i] for i in granted]), columns.places[tested]
+    granted = [i for i in range(len(columns.blocks)) if i not in tested]
+    A, B = (np.concatenate([columns.places[i] for i in blocks]) for blocks in (granted, tested))
     white_A = whole.white_of(A)
     left = columns.without(
         granted, white_A.T @ (white_A @ (columns.score[A] / whole.lengths[A])) / whole.lengths[A]

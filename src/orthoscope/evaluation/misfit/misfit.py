@@ -22,8 +22,11 @@ A holds all that a fit could take (G. Seber and A. Lee, Linear Regression Analys
 fit took beyond that, as an estimated target shape or a free lens does, only makes F smaller. The target is
 tested with the image cells granted, A = (V, S, C), B = T, and the lens with the target granted, A = (V, S,
 T), B = C: a bent target makes a lens look bad and the other way round, so each is only blamed for what the
-other cannot explain. Displacements have three components, since what a dent does in the image turns with the
-view; what poses do as well (shift, turn, size of the whole target) has rank 0 by itself.
+other cannot explain. What a lens does besides its formula is smooth, and cells are steps: what they leave of
+a missing decentering would be blamed on the target. So C also holds smooth displacements of the image that
+any lens may make: radial ones up to the ninth power of the distance from the axis, decentering, thin prism.
+Displacements have three components, since what a dent does in the image turns with the view; what poses do as
+well (shift, turn, size of the whole target) has rank 0 by itself.
 
 **The vote of the views.**  In real photographs the errors of one view hang together (blur, light,
 refinement), and then F exceeds 1 without any misfit. Between views they still do not. So F is computed again
@@ -55,12 +58,15 @@ from orthoscope.evaluation.misfit.whitening import Whitening
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.cells import Cells, cells_for
+from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
 
 __all__ = ["LensMisfit", "Misfit", "MisfitTest", "TargetMisfit", "misfit"]
 
 CELLS = 48  # of the image, about: finer than any lens varies, coarse enough for some corners in each
 PATCHES = 300  # of the target, about: each corner is one, but where there are more corners
+TARGET, LENS = 0, (2, 3)  # numbers of the blocks that are tested
+POWERS = (1, 2, 3, 4)  # of the squared distance, in the smooth terms along a radius
 CLIP = 5.0  # times the noise: one corner in 300 000 is beyond it by chance
 
 
@@ -113,17 +119,22 @@ def misfit(calibration: Calibration) -> Misfit:
     camera = Block(weight * slopes.by_camera, np.zeros_like(slopes.view), 1)
     image = Block(weight * np.eye(2), cells.of(slopes.pixels), cells.columns * cells.rows)
     target = Block(weight * slopes.by_place, patches[slopes.corner], int(patches.max(initial=-1)) + 1)
+    smooth = Block(
+        weight * _smooth_terms(calibration.camera, slopes.pixels + slopes.residual),
+        np.zeros_like(slopes.view),
+        1,
+    )
     columns = Columns(
         weight[:, 0] * slopes.residual,
         weight * slopes.by_pose,
         slopes.view,
         len(detections.views),
-        (target, camera, image),
+        (target, camera, image, smooth),
     )
     whole = Whitening.of(
         columns.gram
     )  # the target, which is large, stands first: what is granted to the lens is then a block of it
-    of_target, of_lens = agreement(columns, whole, 0), agreement(columns, whole, 2)
+    of_target, of_lens = agreement(columns, whole, (TARGET,)), agreement(columns, whole, LENS)
     return Misfit(
         TargetMisfit(
             of_target.test,
@@ -131,7 +142,7 @@ def misfit(calibration: Calibration) -> Misfit:
             _scale(slopes),
             _moved(calibration, columns, of_target),
         ),
-        LensMisfit(of_lens.test, cells, _cell_residuals(of_lens, image, cells)),
+        LensMisfit(of_lens.test, cells, _cell_residuals(of_lens, image, smooth, cells)),
     )
 
 
@@ -169,7 +180,7 @@ def _moved(calibration: Calibration, columns: Columns, of_target: Agreement) -> 
     """
     if not of_target.unknowns.any():
         return 0.0
-    T, S, _ = columns.places
+    T, S, *_ = columns.places
     change = np.linalg.lstsq(
         columns.gram[np.ix_(S, S)], columns.gram[np.ix_(S, T)] @ of_target.unknowns, rcond=None
     )[0]
@@ -181,12 +192,34 @@ def _moved(calibration: Calibration, columns: Columns, of_target: Agreement) -> 
     return float(np.sqrt(np.nanmean(squared))) if np.isfinite(squared).any() else float("nan")
 
 
-def _cell_residuals(found: Agreement, image: Block, cells: Cells) -> Float[ndarray, "rows columns 2"]:
-    """Of each cell: the residual that all its corners share; NaN where there are none."""
-    seen = np.bincount(image.group, minlength=image.groups) > 0
-    return np.where(seen[:, None], found.unknowns.reshape(-1, 2), np.nan).reshape(
-        cells.rows, cells.columns, 2
-    )
+def _smooth_terms(camera: Camera, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2 w"]:
+    """What lenses do besides a formula, as displacements of the image: radial, decentering, thin prism.
+
+    Args:
+        pixels: predicted. At detected ones a term less the same term of the formula would be the error
+            itself.
+    """
+    frame = camera.lens_frame or camera.intrinsics
+    x, y = ((pixels - [frame.cx, frame.cy]) / (0.5 * np.hypot(*camera.image_size))).T
+    s, zero = x * x + y * y, np.zeros_like(x)
+    radial = [(x * s**power, y * s**power) for power in POWERS]
+    decentering = [(s + 2.0 * x * x, 2.0 * x * y), (2.0 * x * y, s + 2.0 * y * y)]
+    prism = [(s, zero), (zero, s), (s * s, zero), (zero, s * s)]
+    return np.moveaxis(np.array([*radial, *decentering, *prism]), 0, -1).transpose(1, 0, 2)
+
+
+def _cell_residuals(
+    found: Agreement, image: Block, smooth: Block, cells: Cells
+) -> Float[ndarray, "rows columns 2"]:
+    """Of each cell the residual that its corners share, smooth terms included; NaN where there are none."""
+    counts = np.bincount(image.group, minlength=image.groups)
+    steps, terms = np.split(found.unknowns, [image.width])
+    smoothly = [
+        np.bincount(image.group, weights=row, minlength=image.groups) / np.maximum(counts, 1)
+        for row in smooth.times(terms).T
+    ]
+    residuals = steps.reshape(-1, 2) + np.stack(smoothly, axis=1)
+    return np.where(counts[:, None] > 0, residuals, np.nan).reshape(cells.rows, cells.columns, 2)
 
 
 def _scale(slopes: Slopes) -> float:

@@ -9,10 +9,17 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import msgspec
+
+from orthoscope.evaluation.camera_error import CameraError
+from orthoscope.evaluation.disagreement import Disagreement
 from orthoscope.evaluation.evaluate import Evaluation
+from orthoscope.evaluation.groups import Groups
 from orthoscope.evaluation.misfit.f_test import MisfitTest
 from orthoscope.evaluation.misfit.misfit import LensMisfit, Misfit, TargetMisfit
-from orthoscope.evaluation.verdict import ViewError
+from orthoscope.evaluation.suspects import ViewError
+from orthoscope.evaluation.verdict.situation import Situation
+from orthoscope.evaluation.verdict.verdict import verdict_on
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.formats.own.schema import CameraFile
 from orthoscope.formats.own.struct import FileStruct, Number, Record, array_of, null_for_nan, rows_of
@@ -81,9 +88,107 @@ class LensMisfitFile(FileStruct):
         return LensMisfit(self.test.core(), cells, array_of(self.residuals, self.rows, self.columns, 2))
 
 
+class CameraErrorFile(FileStruct):
+    """The maps are rows of the frame, top to bottom; the region is a polygon of pixels."""
+
+    seen_px: Number
+    frame_px: Number
+    near_seen_px: Number
+    near_frame_px: Number
+    model_px: Number
+    alike_px: Number
+    views_px: Number
+    bias_px: Number
+    distance: Number
+    limit_px: Number
+    far: list[list[Number]]
+    near: list[list[Number]]
+    region: list[tuple[float, float]]
+
+    @classmethod
+    def of(cls, error: CameraError) -> CameraErrorFile:
+        numbers = {name: null_for_nan(getattr(error, name)) for name in cls._numbers()}
+        region = [(float(x), float(y)) for x, y in error.region]
+        return cls(far=rows_of(error.far), near=rows_of(error.near), region=region, **numbers)
+
+    def core(self) -> CameraError:
+        numbers: dict[str, Any] = {
+            name: float("nan") if getattr(self, name) is None else getattr(self, name)
+            for name in self._numbers()
+        }
+        far, near = (array_of(rows, len(rows), -1) for rows in (self.far, self.near))
+        return CameraError(far=far, near=near, region=array_of(list(self.region), -1, 2), **numbers)
+
+    @classmethod
+    def _numbers(cls) -> list[str]:
+        return [field.name for field in msgspec.structs.fields(cls) if field.type == Number]
+
+
+class DisagreementFile(Record):
+    """What each view would have liked is not kept."""
+
+    CORE: ClassVar[type] = Disagreement
+    f2: Number
+    p_value: Number
+    certain: bool
+    kind: str
+    by_px: Number
+    focal: Number
+    centre_px: Number
+
+
+class SituationFile(Record):
+    """The facts that the verdict is made from."""
+
+    CORE: ClassVar[type] = Situation
+    method: str
+    lens: str
+    shape: str
+    base: str
+    through: str
+    views: int
+    distinct: int
+    converged: bool
+    error_px: Number
+    coarse_px: Number
+    share: Number
+    covered: Number
+    place: str
+    noise_px: Number
+    tilt: Number
+    corners: int
+    wild: int
+    loss: str
+    beyond: int
+    fold: Number
+    disagree: str
+    differ_px: Number
+    differ_focal: Number
+    differ_centre_px: Number
+    groups: tuple[tuple[str, ...], ...]
+    lens_px: Number
+    target_px: Number
+    target_mm: Number
+    suspects: tuple[tuple[str, str], ...]
+    precious: tuple[tuple[str, str], ...]
+
+
+class GroupsFile(Record):
+    CORE: ClassVar[type] = Groups
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    unsure: tuple[int, ...]
+
+
 class EvaluationFile(FileStruct, kw_only=True):
     version: str
     verdict: str
+    grade: str
+    cause: str = ""
+    situation: SituationFile
+    error: CameraErrorFile | None
+    disagreement: DisagreementFile
+    groups: GroupsFile | None
     warnings: list[str]
     rms_px: Number
     median_px: Number
@@ -110,7 +215,13 @@ class EvaluationFile(FileStruct, kw_only=True):
             held_out_residuals=[rows_of(residuals) for residuals in evaluation.held_out_residuals],
             suspects=list(evaluation.suspects),
             warnings=list(evaluation.warnings),
-            verdict=evaluation.verdict,
+            verdict=str(evaluation.verdict),
+            grade=str(evaluation.verdict.grade),
+            cause=evaluation.verdict.cause,
+            situation=SituationFile.of(evaluation.situation),
+            error=CameraErrorFile.of(evaluation.error) if evaluation.error else None,
+            disagreement=DisagreementFile.of(evaluation.disagreement),
+            groups=GroupsFile.of(evaluation.groups) if evaluation.groups else None,
             **{name: null_for_nan(getattr(evaluation, name)) for name in NUMBERS},
         )
 
@@ -128,6 +239,7 @@ class EvaluationFile(FileStruct, kw_only=True):
             raise InputError("it judges another camera than the calibration's; evaluate that one anew")
         if len(self.held_out_residuals) != len(self.views):
             raise InputError(f"it has not {len(self.views)} tables of held-out residuals, one for each view")
+        situation = self.situation.core()
         numbers: dict[str, Any] = {
             name: float("nan") if getattr(self, name) is None else getattr(self, name) for name in NUMBERS
         }
@@ -141,7 +253,11 @@ class EvaluationFile(FileStruct, kw_only=True):
             ),
             suspects=tuple(self.suspects),
             warnings=tuple(self.warnings),
-            verdict=self.verdict,
+            verdict=verdict_on(situation),
+            error=self.error.core() if self.error else None,
+            disagreement=self.disagreement.core(),
+            groups=self.groups.core() if self.groups else None,
+            situation=situation,
             **numbers,
         )
 

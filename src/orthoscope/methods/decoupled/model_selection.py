@@ -7,13 +7,12 @@ decide alone.  So models are
 compared by ratios: the mean over views, weighed by their corners, of the logarithm of how many times larger
 the squared error of one is than that of the other, in standard errors of that mean.  Rules:
 
-`first_as_good`         the first that does not surely lose against the best, models coming in order of
-preference: among base formulas `simplest_as_good`      the same within one standard error, simplest first:
-among formulas whose coefficients nothing holds back
-                        (L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3)
-`richest_unless_worse`  the richest unless another foresees surely better: among models whose weights were
-found and that contain each
-                        other, so that a richer one costs little where it is not needed
+- `first_as_good`: the first that loses little against the best, and not surely, models coming in order of
+  preference; among base formulas.
+- `simplest_as_good`: the first within one standard error of the best, simplest first; among formulas whose
+  coefficients nothing holds back (L. Breiman et al., Classification and Regression Trees, 1984, 3.4.3).
+- `richest_unless_worse`: the richest unless another foresees surely better; among models whose weights were
+  found and that contain each other, so that a richer one costs little where it is not needed.
 
 docs/measured/choice.md has what each rule gives, on photographs and in simulation.
 """
@@ -33,6 +32,7 @@ __all__ = ["Contender", "first_as_good", "judged", "richest_unless_worse", "simp
 
 
 ABOUT, SURELY = 1.0, 2.0  # standard errors of a difference that may be chance, and that is hardly so
+LITTLE = 0.1  # of a squared error, in logarithms: 5 % of an error
 NOTHING = 1e-12  # px^2 of a corner: less is no error at all
 
 
@@ -57,22 +57,16 @@ def simplest_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " 
 
     corners: of each view.
     """
-    return first_as_good(contenders, corners, within=ABOUT)
+    return _first_within(contenders, corners, ABOUT, np.inf)
 
 
-def first_as_good(
-    contenders: Sequence[Contender], corners: Float[ndarray, " m"], *, within: float = SURELY
-) -> int:
-    """The index of the first contender that does not surely lose against the best; contenders come in order
-    of preference.
+def first_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " m"]) -> int:
+    """The index of the first contender that loses little against the best, and not surely; contenders come in
+    order of preference.
 
-    corners: of each view.  within: standard errors that may be lost.
+    corners: of each view.
     """
-    able = _able(contenders)
-    best = _best(contenders, corners, able)
-    return next(
-        (i for i in able if i == best or _loses(contenders[i], contenders[best], corners) <= within), 0
-    )
+    return _first_within(contenders, corners, SURELY, LITTLE)
 
 
 def richest_unless_worse(contenders: Sequence[Contender], corners: Float[ndarray, " m"]) -> int:
@@ -85,7 +79,8 @@ def richest_unless_worse(contenders: Sequence[Contender], corners: Float[ndarray
     if not able:
         return 0
     best, richest = _best(contenders, corners, able), able[-1]
-    return best if _loses(contenders[richest], contenders[best], corners) > SURELY else richest
+    loses, error = _difference(contenders[richest], contenders[best], corners)
+    return best if loses > SURELY * error else richest
 
 
 def judged(
@@ -108,6 +103,21 @@ def judged(
     )
 
 
+def _first_within(
+    contenders: Sequence[Contender], corners: Float[ndarray, " m"], errors: float, share: float
+) -> int:
+    """The first that is the best, or loses no more against it than so many standard errors and such a
+    share.
+    """
+    able = _able(contenders)
+    best = _best(contenders, corners, able)
+    for i in able:
+        mean, error = _difference(contenders[i], contenders[best], corners)
+        if i == best or (mean <= share and (mean <= errors * error or (error == 0.0 and mean <= 0.0))):
+            return i
+    return 0
+
+
 def _able(contenders: Sequence[Contender]) -> list[int]:
     """Those that as many views could judge as any contender: what fewer judge, rests on the others alone."""
     counts = [int(np.isfinite(contender.squares).sum()) for contender in contenders]
@@ -119,12 +129,11 @@ def _best(contenders: Sequence[Contender], corners: Float[ndarray, " m"], able: 
     return min(able, key=lambda i: _weighed(_logarithms(contenders[i], corners), corners)[0], default=0)
 
 
-def _loses(one: Contender, other: Contender, corners: Float[ndarray, " m"]) -> float:
-    """The mean logarithm of the ratio of the two errors, in its standard errors, views taken as independent
-    draws.
+def _difference(one: Contender, other: Contender, corners: Float[ndarray, " m"]) -> tuple[float, float]:
+    """The mean logarithm of the ratio of the two squared errors, and its standard error, views taken as
+    independent draws.
     """
-    mean, error = _weighed(_logarithms(one, corners) - _logarithms(other, corners), corners)
-    return mean / error if error > 0 else 0.0
+    return _weighed(_logarithms(one, corners) - _logarithms(other, corners), corners)
 
 
 def _logarithms(contender: Contender, corners: Float[ndarray, " m"]) -> Float[ndarray, " m"]:

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from orthoscope.evaluation.evaluate import Evaluation
+from orthoscope.fitting.calibration import Candidate
+from orthoscope.models.lenses import FREE
 
-__all__ = ["choice"]
+__all__ = ["choice", "model_name"]
 
 
 def choice(evaluation: Evaluation) -> dict[str, Any] | str:
@@ -19,7 +21,7 @@ def choice(evaluation: Evaluation) -> dict[str, Any] | str:
     return {
         "candidates": [
             {
-                "name": f"{one.target} target, {one.lens} lens",
+                "name": model_name(one),
                 "heldOut": round(one.held_out_px, 6),
                 "error": round(one.standard_error_px, 6) if np.isfinite(one.standard_error_px) else None,
                 "loses": round(one.loses_px, 6) if np.isfinite(one.loses_px) else None,
@@ -27,3 +29,10 @@ def choice(evaluation: Evaluation) -> dict[str, Any] | str:
             for one in candidates
         ]
     }
+
+
+def model_name(candidate: Candidate) -> str:
+    """What tells a candidate from the others: `flat target, brown` or `free target, free on brown`."""
+    lens = f"free on {candidate.base}" if candidate.lens == FREE and candidate.base else candidate.lens
+    pairs = " from pairs" if candidate.fit == "pairs" else ""
+    return f"{candidate.target} target, {lens}{pairs}"

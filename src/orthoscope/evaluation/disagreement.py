@@ -1,0 +1,272 @@
+"""Do the photographs agree on one camera?  A test of what each of them would have liked K to be.
+
+A lens that zooms or focuses between photographs, a stabiliser, a rolling shutter, two cameras in one folder:
+in each view the residuals then ask for another K.  With the fit linearised (fitting/linearised.py), C_j what
+a few changes of K do to the residuals of view j, its pose fitted, B_j what its own say in the fit explains,
+s2 the noise:
+
+    T_j = C_j'(I - B_j) C_j,    s_j = C_j'e_j,    the view's wish  kappa_j = -T_j^-1 s_j,
+    F = sum s_j'T_j^+ s_j / (s2 sum rank T_j)
+
+F is far above 1 on photographs that agree, since the errors of one view are alike (boards bend from view to
+view, and what bends is of the second order).  So it is divided by how far the views' residuals follow second-
+order patterns of the board that no change of K makes: tau, the same ratio for these patterns, C_j projected
+out.  F2 = F / max(1, tau) has Fisher's distribution where views agree but bend.  The fit must be the one with
+every corner free and a free lens: else the target's shape, which each view sees from another side, is taken
+for a camera that changes.
+
+How much the camera changes is the spread of the wishes without their noise: kappa_j ~ N(0, S), S by
+expectation maximisation, and the rms movement of the image that S makes, a rotation fitted out.  A shutter
+that reads row after row shears the image, which is no change of K, and is tested in the same way.  The focal
+length alone and the principal point alone are tested too: one wish out of many stands out more by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.evaluation.misfit.f_distribution import f_survival
+from orthoscope.fitting.leave_one_out import hat_of
+from orthoscope.fitting.linearised import Linearised
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.models.camera import Camera
+from orthoscope.models.difference import image_difference
+from orthoscope.models.parameters import Parameters
+from orthoscope.targets.detections import Detections
+
+__all__ = ["AGREED", "Disagreement", "Wishes", "changes_of", "disagreement", "spread_of", "wishes"]
+
+STEP = 0.01  # of the focal length or of the image's width: a change of K that counts as 1
+FAINT = 1e-3  # of the largest: an eigenvalue of T_j below it is no wish
+OWN = 0.3  # singular value of a pattern, C_j projected out: below it the pattern is one that K makes too
+LARGE, SURE = 3.0, 1e-4  # F2 above, p below: views do not agree
+FEWEST_VIEWS = 5
+KINDS = {
+    "zoom": [0],
+    "centre": [1, 2],
+    "shutter": [3, 4],
+}  # columns: scale, cx, cy, and the shears of a shutter
+SPREADING = 200  # rounds of expectation maximisation
+SAMPLE = 300  # pixels at which an image's movement is looked at
+
+
+class Wishes(NamedTuple):
+    """What each of m views would have liked c changes of K to be.
+
+    Args:
+        kappa: (m,c) the wish, in the changes' own steps; 0 where the view has none.
+        told: (m,c,c) T_j over the noise and tau: the inverse of the wish's covariance.
+        f2: F over max(1, tau).
+        p_value: of f2.
+        tau: how alike errors within a view are.
+    """
+
+    kappa: Float[ndarray, "m c"]
+    told: Float[ndarray, "m c c"]
+    f2: float
+    p_value: float
+    tau: float
+
+    @property
+    def certain(self) -> bool:
+        """Whether the views surely differ."""
+        return self.f2 > LARGE and self.p_value < SURE
+
+    @property
+    def spread(self) -> Float[ndarray, "c c"]:
+        """Covariance of the wishes without their noise."""
+        return spread_of(-(self.told @ self.kappa[..., None])[..., 0], self.told)
+
+
+@dataclass(frozen=True, eq=False)
+class Disagreement:
+    """Whether photographs agree on one camera.
+
+    Args:
+        f2, p_value: of the test; NaN where the views do not suffice for one.
+        certain: whether they surely do not.
+        kind: what changes most between them: `zoom`, `centre`, `shutter`; empty where they agree.
+        by_px: how far the image moves from photograph to photograph, rms over the seen pixels and the
+            photographs, after a rotation.
+        focal: standard deviation of the focal length over photographs, as a share of it.
+        centre_px: standard deviation of the principal point, pixels.
+        wishes: of scale, cx and cy; None where there was no test, or it was read from a file.
+    """
+
+    f2: float
+    p_value: float
+    certain: bool
+    kind: str
+    by_px: float
+    focal: float
+    centre_px: float
+    wishes: Wishes | None = None
+
+
+AGREED = Disagreement(float("nan"), float("nan"), False, "", 0.0, 0.0, 0.0)
+
+
+def disagreement(fit: Linearised, detections: Detections) -> Disagreement:
+    """Whether the views of a fit agree on one camera.
+
+    Args:
+        fit: with every corner free and a free lens, of these detections.
+    """
+    names, changes = changes_of(fit)
+    points, pixels = detections.target.points, np.concatenate([view.pixels for view in detections.views])
+    if fit.views < FEWEST_VIEWS or len(names) < 3:
+        return AGREED
+    moves = np.concatenate(
+        [fit.moves(changes), fit.without_pose(fit.root[..., None] * _shears(detections))], axis=2
+    )
+    of_K = wishes(fit, points, moves[:, :, : len(names)])
+    tests = [of_K, *(wishes(fit, points, moves[:, :, columns]) for columns in KINDS.values())]
+    strongest = min(tests, key=lambda test: (not test.certain, test.p_value))
+    if not strongest.certain:
+        return replace(AGREED, f2=of_K.f2, p_value=of_K.p_value, wishes=of_K)
+    spread = of_K.spread
+    width = fit.camera.image_size[0]
+    return Disagreement(
+        f2=strongest.f2,
+        p_value=strongest.p_value,
+        certain=True,
+        kind=_kind(fit, moves),
+        by_px=_movement(fit, changes, spread, pixels),
+        focal=STEP * float(np.sqrt(spread[0, 0])),
+        centre_px=STEP * width * float(np.sqrt(spread[1, 1] + spread[2, 2])),
+        wishes=of_K,
+    )
+
+
+def changes_of(fit: Linearised, more: tuple[str, ...] = ()) -> tuple[tuple[str, ...], Float[ndarray, "q c"]]:
+    """The changes of the camera that a view may wish for, as steps of a fit's unknowns, and their names.
+
+    Args:
+        more: names of coefficients beside scale, cx and cy, each with a step of its own size, where the fit
+            has them.
+    """
+    K, width = fit.camera.intrinsics, fit.camera.image_size[0]
+    parts = [name.split("=") for name in fit.names]
+    scale = {i: STEP * getattr(K, part[0]) for i, part in enumerate(parts) if part[0] in ("fx", "fy")}
+    steps: dict[str, dict[int, float]] = {"scale": scale} if scale else {}
+    for name in ("cx", "cy"):
+        if [name] in parts:
+            steps[name] = {parts.index([name]): STEP * width}
+    steps |= {name: {parts.index([name]): STEP} for name in more if [name] in parts}
+    changes = np.zeros((fit.unknowns, len(steps)))
+    for column, step in enumerate(steps.values()):
+        changes[list(step), column] = list(step.values())
+    return tuple(steps), changes
+
+
+def wishes(fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]) -> Wishes:
+    """What the views wish, and whether the wishes differ.
+
+    Args:
+        points: the target's corners, metres.
+        moves: C_j, of weighted residuals with the pose of each view fitted.
+    """
+    told = _told(moves, hat_of(fit, moves))
+    score = (moves * fit.errors[..., None]).sum(1)
+    inverse, rank = _pseudo_inverse(told)
+    kappa = -(inverse @ score[..., None])[..., 0]
+    f = float((score * -kappa).sum() / (fit.noise * max(rank.sum(), 1)))
+    tau, freedom = _alike(fit, points, moves)
+    f2, tested = f / max(1.0, tau), float(rank.sum() - moves.shape[2])
+    p_value = f_survival(f2, tested, freedom) if tested > 0 and freedom > 0 else float("nan")
+    return Wishes(kappa, told / (fit.noise * max(1.0, tau)), f2, p_value, tau)
+
+
+def _told(moves: Float[ndarray, "m n c"], explained: Float[ndarray, "m n c"]) -> Float[ndarray, "m c c"]:
+    """T_j = C_j'(I - B_j) C_j."""
+    told = moves.transpose(0, 2, 1) @ (moves - explained)
+    return 0.5 * (told + told.transpose(0, 2, 1))
+
+
+def _pseudo_inverse(told: Float[ndarray, "m c c"]) -> tuple[Float[ndarray, "m c c"], Float[ndarray, " m"]]:
+    """T_j^+ and the ranks, faint directions left out; columns are scaled alike in all views first."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).max(0), 1e-300))
+    values, vectors = np.linalg.eigh(told * scale * scale[:, None])
+    strong = values > FAINT * max(values.max(), 1e-300)
+    inverse = (
+        vectors * np.where(strong, 1.0 / np.where(strong, values, 1.0), 0.0)[:, None]
+    ) @ vectors.transpose(0, 2, 1)
+    return inverse * scale * scale[:, None], strong.sum(1).astype(float)
+
+
+def _alike(
+    fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]
+) -> tuple[float, float]:
+    """tau of the second-order patterns that the changes do not make, and their degrees of freedom."""
+    x, y = (points[:, :2] - points[:, :2].mean(0)).T / max(float(np.ptp(points[:, :2])), 1e-300)
+    shapes, zero = np.stack([x * x, x * y, y * y], axis=1), np.zeros((len(points), 3))
+    patterns = np.block([[shapes, zero], [zero, shapes]])  # (2p, 6)
+    rows = fit.without_pose(fit.root[..., None] * patterns)
+    rows = rows / np.maximum(np.sqrt((rows**2).sum(1, keepdims=True)), 1e-300)
+    basis = np.linalg.qr(moves / np.maximum(np.sqrt((moves**2).sum(1, keepdims=True)), 1e-300))[0]
+    rows = rows - basis @ (basis.transpose(0, 2, 1) @ rows)
+    vectors, values, _ = np.linalg.svd(rows, full_matrices=False)
+    vectors = vectors * (values > OWN)[:, None]
+    freedom = float((vectors * (vectors - hat_of(fit, vectors))).sum())
+    energy = float(((vectors.transpose(0, 2, 1) @ fit.errors[..., None]) ** 2).sum())
+    return energy / (fit.noise * max(freedom, 1e-9)), freedom
+
+
+def spread_of(score: Float[ndarray, "m c"], told: Float[ndarray, "m c c"]) -> Float[ndarray, "c c"]:
+    """Covariance S of changes k_j ~ N(0, S), of which view j tells exp(-k's_j - k'T_j k / 2)."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).mean(0), 1e-300))
+    heard, told = -score * scale, told * scale * scale[:, None]
+    spread = np.eye(len(scale))
+    for _ in range(SPREADING):
+        posterior = np.linalg.inv(np.linalg.inv(spread) + told)
+        mean = (posterior @ heard[..., None])[..., 0]
+        spread = (mean[:, :, None] * mean[:, None] + posterior).mean(0)
+        spread += 1e-9 * np.trace(spread) * np.eye(len(spread))
+    return spread * scale * scale[:, None]
+
+
+def _movement(fit: Linearised, changes: ndarray, spread: ndarray, pixels: Float[ndarray, "n 2"]) -> float:
+    """How far the image moves for changes of this covariance, rms over the pixels, after a rotation."""
+    values, vectors = np.linalg.eigh(spread)
+    squares = 0.0
+    for value, vector in zip(values, vectors.T, strict=True):
+        step = np.sqrt(max(float(value), 0.0)) * changes[: len(fit.names)] @ vector
+        squares += _moved_squared(fit.camera, fit.names, step, pixels)
+    return float(np.sqrt(squares))
+
+
+def _moved_squared(camera: Camera, names: tuple[str, ...], step: ndarray, pixels: ndarray) -> float:
+    sample = pixels[:: max(1, len(pixels) // SAMPLE)]
+    difference = image_difference(camera, Parameters.of(names).moved(camera, step), sample)
+    return float(np.nanmean((difference**2).sum(1)))
+
+
+def _kind(fit: Linearised, moves: Float[ndarray, "m n 5"]) -> str:
+    """Which of KINDS explains most, for each of its columns, of what the others leave."""
+    told = _told(moves, hat_of(fit, moves))
+    score = (moves * fit.errors[..., None]).sum(1)
+
+    def explained(columns: list[int]) -> float:
+        inverse, _ = _pseudo_inverse(told[:, columns][:, :, columns])
+        return float((score[:, columns] * (inverse @ score[:, columns, None])[..., 0]).sum())
+
+    everything = list(range(moves.shape[2]))
+    whole = explained(everything)
+    beyond = {
+        kind: (whole - explained([i for i in everything if i not in columns])) / len(columns)
+        for kind, columns in KINDS.items()
+    }
+    return max(beyond, key=lambda kind: beyond[kind])
+
+
+def _shears(detections: Detections) -> Float[ndarray, "m n 2"]:
+    """What a shutter does that reads row after row while the target moves: u, or v, moves with the row."""
+    corners, height = len(detections.target.points), detections.image_size[1]
+    shears = np.zeros((len(detections.views), 2 * corners, 2))
+    for shear, view in zip(shears, detections.views, strict=True):
+        row = view.pixels[:, 1] / height - 0.5
+        shear[view.ids, 0], shear[corners + view.ids, 1] = row, row
+    return shears

@@ -1,0 +1,236 @@
+"""Which photographs one camera took and which the other: the groups of views that do not agree.
+
+What each view would have liked the camera to be (disagreement.py) is a quadratic, q_j(k) = 2 k's_j + k'T_j k,
+of a few changes k of the camera.  Two cameras are two changes, and each view belongs to the one at which its
+quadratic is lower. Two questions, and either makes two groups of photographs:
+
+1. *Is it two values, or a spread?*  exp(-q_j / 2) is the likelihood of a view.  Two changes, each view with
+   one of them, are compared with changes that are normally distributed (a lens that focuses anew for every
+   photograph): groups are named where two values are TWICE_AS_LIKELY.  A view whose likelihoods differ too
+   little to tell belongs to neither.
+2. *Do two cameras foresee the photographs far better?*  Groupings of the linear step are refined by a fit for
+   each group, each view going to the camera that sees it with less error (by leave-one-out in its own group),
+   until nothing changes. Photographs are of two cameras where these foresee them with less than APART of the
+   error of one for all.
+
+The first finds what is small beside the noise, the second what is too large to be linear.
+S. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28(2), 1982 (k-means, here on
+quadratics).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.evaluation.disagreement import Disagreement, changes_of, spread_of
+from orthoscope.fitting.calibration import residuals_of
+from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of, leave_one_out
+from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.resection import resect
+from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
+from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
+from orthoscope.methods.decoupled.step_one_linearised import linearised
+from orthoscope.methods.fccm import fit_flat
+from orthoscope.models.lenses import FREE
+from orthoscope.targets.detections import Detections
+
+__all__ = ["Groups", "two_groups"]
+
+APART = 0.7  # of the error of one camera for all
+BEYOND_DOUBT = 0.5  # of it: with less, no other start is tried
+TWICE_AS_LIKELY = 2.5  # logarithm of the likelihood ratio: two values against a spread
+CERTAINLY = 0.95  # a view with less than this for either group is in none
+# of the squared residuals: what the linear step must explain of them before fits are worth their time
+SMALL = 0.3
+FEWEST = 4  # views of a group: with fewer, none can be left out
+STARTS = 60
+ROUNDS = 6  # of refinement
+SETTLING = 60  # rounds of k-means, and of the likelihoods
+REFINED = 4  # groupings
+
+
+class Groups(NamedTuple):
+    """Two groups of views.
+
+    Args:
+        first, second: indices of the views, ascending; the larger group first.
+        unsure: of views that may be in either.
+    """
+
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    unsure: tuple[int, ...] = ()
+
+
+class _Quadratics(NamedTuple):
+    """What the views say of a change k: 2 k's_j + k'T_j k, over the noise.  score (m,c), told (m,c,c)."""
+
+    score: ndarray
+    told: ndarray
+
+    def at(self, change: Float[ndarray, " c"]) -> Float[ndarray, " m"]:
+        """Of each view."""
+        return 2.0 * self.score @ change + (self.told @ change) @ change
+
+    def lowest(self, say: Float[ndarray, " m"]) -> Float[ndarray, " c"]:
+        """The change at which the sum over views, each with its say, is lowest."""
+        told = (say[:, None, None] * self.told).sum(0)
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(told), 1e-300))
+        faint = 1e-9 * np.eye(len(told))
+        return -scale * np.linalg.solve(told * scale * scale[:, None] + faint, scale * (say @ self.score))
+
+
+def two_groups(
+    fit: Linearised, found: Disagreement, whole: LeaveOneOut, detections: Detections, *, base: str
+) -> Groups | None:
+    """The two groups that photographs which do not agree fall into; None where they fall into no two.
+
+    Args:
+        fit: of all views, every corner free and a free lens.
+        found: how they disagree.
+        whole: each view left out of the fit.
+        detections: of the fit.
+        base: the formula under the free lens.
+    """
+    if found.wishes is None or fit.views < 2 * FEWEST:
+        return None
+    noise = fit.noise * max(1.0, found.wishes.tau)
+    groupings = _groupings(_quadratics(fit, noise, ("k1",)))
+    explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
+    joint, best = float(np.nansum(whole.squares)), (np.inf, None)
+    for _, start in groupings[:REFINED] if explained > SMALL else ():
+        refined = _refined(detections, start, base=base)
+        if refined is not None and refined[0] < best[0]:
+            best = refined
+        if np.sqrt(best[0] / joint) < BEYOND_DOUBT:
+            break
+    squares, second = best
+    if second is not None and np.sqrt(squares / joint) < APART:
+        return _named(second, np.ones(len(second), dtype=bool))
+    return None if found.kind == "shutter" else _two_values(_quadratics(fit, noise))
+
+
+def _quadratics(fit: Linearised, noise: float, more: tuple[str, ...] = ()) -> _Quadratics:
+    _, changes = changes_of(fit, more)
+    moves = fit.moves(changes)
+    told = moves.transpose(0, 2, 1) @ (moves - hat_of(fit, moves))
+    return _Quadratics(
+        (moves * fit.errors[..., None]).sum(1) / noise, 0.5 * (told + told.transpose(0, 2, 1)) / noise
+    )
+
+
+def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
+    """Groupings by k-means, and the best cut of each wish as it is: the sum of the quadratics, who is in the
+    second; best first.
+    """
+    views = len(say.score)
+    faint = 1e-9 * np.eye(say.score.shape[1]) * np.trace(say.told.mean(0))
+    wishes = -np.linalg.solve(say.told + faint, say.score[..., None])[..., 0]
+    cuts = [[wish > cut for cut in np.sort(wish)[FEWEST - 1 : -FEWEST]] for wish in wishes.T]
+    rng = np.random.default_rng(0)
+    starts = [rng.random(views) < 0.5 for _ in range(STARTS)] + [
+        start for of_wish in cuts for start in of_wish
+    ]
+    ends = [_clustered(say, start) for start in starts]
+    ends += [min(of_wish, key=lambda second: _value(say, second)) for of_wish in cuts if of_wish]
+    able = {
+        (second ^ second[0]).tobytes(): second for second in ends if FEWEST <= second.sum() <= views - FEWEST
+    }
+    return sorted(((_value(say, second), second) for second in able.values()), key=lambda entry: entry[0])
+
+
+def _clustered(say: _Quadratics, second: Bool[ndarray, " m"]) -> Bool[ndarray, " m"]:
+    """k-means on quadratics from a start."""
+    for _ in range(SETTLING):
+        if not 1 <= second.sum() < len(second):
+            break
+        moved = say.at(say.lowest(second.astype(float))) < say.at(say.lowest((~second).astype(float)))
+        if (moved == second).all():
+            break
+        second = moved
+    return second
+
+
+def _value(say: _Quadratics, second: Bool[ndarray, " m"]) -> float:
+    """The sum of the quadratics, each at its group's lowest."""
+    return float(sum(say.at(say.lowest(group.astype(float)))[group].sum() for group in (~second, second)))
+
+
+def _two_values(say: _Quadratics) -> Groups | None:
+    """Question 1."""
+    groupings = _groupings(say)
+    if not groupings:
+        return None
+    share = np.stack([~groupings[0][1], groupings[0][1]]).astype(float)
+    likely = np.zeros(share.shape[1])
+    for _ in range(SETTLING):
+        weight = np.maximum(share.mean(1), 1e-6)
+        each = np.stack(
+            [np.log(w) - 0.5 * say.at(say.lowest(part)) for w, part in zip(weight, share, strict=True)]
+        )
+        likely = np.logaddexp(*each)
+        share = np.exp(each - likely)
+    if likely.sum() - _likelihood_of_spread(say) < TWICE_AS_LIKELY:
+        return None
+    second, sure = share[1] > share[0], share.max(0) > CERTAINLY
+    few = min((sure & second).sum(), (sure & ~second).sum()) < FEWEST
+    return None if few else _named(second, sure)
+
+
+def _likelihood_of_spread(say: _Quadratics) -> float:
+    """Logarithm of the likelihood of all views where changes are normally distributed."""
+    spread = spread_of(say.score, say.told)
+    c = len(spread)
+    mean = np.linalg.solve(np.linalg.inv(spread) + say.told, say.score[..., None])[..., 0]
+    return float(
+        (0.5 * (say.score * mean).sum(1) - 0.5 * np.linalg.slogdet(np.eye(c) + spread @ say.told)[1]).sum()
+    )
+
+
+def _refined(
+    detections: Detections, second: Bool[ndarray, " m"], *, base: str
+) -> tuple[float, Bool[ndarray, " m"]] | None:
+    """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no
+    camera.
+    """
+    seen: set[bytes] = set()
+    best: tuple[float, ndarray] | None = None
+    for _ in range(ROUNDS):
+        if second.tobytes() in seen or not FEWEST <= second.sum() <= len(second) - FEWEST:
+            break
+        seen.add(second.tobytes())
+        try:
+            squares = np.stack(
+                [_squares(detections, np.flatnonzero(group), base=base) for group in (~second, second)]
+            )
+        except CalibrationError:
+            break
+        total = float(np.where(second, squares[1], squares[0]).sum())
+        if np.isfinite(total) and (best is None or total < best[0]):
+            best = total, second
+        second = squares[1] < squares[0]
+    return best
+
+
+def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndarray, " m"]:
+    """Squared error of each view by a group's camera: left out where it is of the group."""
+    fit = _fit(detections.only(group), base=base)
+    shape, camera = fit.shape, fit.estimate.camera
+    poses = resect(camera, detections, shape=shape)
+    squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
+    squares[group] = leave_one_out(linearised(fit)).squares
+    return squares
+
+
+def _fit(detections: Detections, *, base: str) -> StepOneFit:
+    return fit_step_one(fit_flat(detections, lens=base), target="free", through=FREE)
+
+
+def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:
+    groups = sorted(
+        (np.flatnonzero(group & sure).tolist() for group in (~second, second)),
+        key=lambda group: (-len(group), group),
+    )
+    return Groups(tuple(groups[0]), tuple(groups[1]), tuple(np.flatnonzero(~sure).tolist()))

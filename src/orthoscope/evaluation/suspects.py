@@ -1,0 +1,104 @@
+"""Which photographs do not belong, and which are precious.
+
+A photograph does not belong where its own residuals, after the fit that used it, are far above the typical
+photograph's. What they are like says why: white where its corners were found badly, smooth over the board
+where the board was bent in another way (which is no fault of its corners, and no reason to leave it out).
+Held-out error does not tell: it is large too where nothing else shows what the photograph shows, and such a
+photograph is *precious*; more like it are what the camera needs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orthoscope.evaluation.coverage import place_of
+from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.scatter import patterns_over_views
+from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.targets.detections import Detections
+
+__all__ = ["ViewError", "precious_among", "suspects_among"]
+
+SUSPECT = 2.5  # times the typical photograph's rms
+NOTABLE_PX = 0.3  # but not where it is small in itself
+SMOOTH = 0.6  # of the squared residuals: what patterns of low order explain of them where a board was bent
+ALONE = 2.0  # times what the photograph's own residual is: its error where it is left out
+GAINED = 1.5  # times the typical left-out error
+FEWEST_VIEWS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class ViewError:
+    """One photograph's share.
+
+    Args:
+        image: its name.
+        corners: that were used.
+        rms_px: per point, in the calibration.
+        held_out_rms_px: when it was held out; NaN where that was not done.
+    """
+
+    image: str
+    corners: int
+    rms_px: float
+    held_out_rms_px: float
+
+
+def suspects_among(
+    views: tuple[ViewError, ...], known: Linearised | None, points: Float[ndarray, "p 3"]
+) -> tuple[tuple[str, str], ...]:
+    """Images of the photographs that do not belong, with what is wrong.
+
+    Args:
+        known: the richest fit of them, where there is one.
+        points: the target's corners, nominal.
+    """
+    errors = np.array([view.rms_px for view in views])
+    if len(views) < FEWEST_VIEWS:
+        return ()
+    typical = float(np.median(errors))
+    odd = np.flatnonzero(errors > max(SUSPECT * typical, NOTABLE_PX))
+    if not len(odd):
+        return ()
+    smooth = _smooth_share(known, points) if known else np.zeros(len(views))
+    return tuple((views[i].image, _wrong(views[i].rms_px, typical, smooth[i])) for i in odd)
+
+
+def _wrong(error: float, typical: float, smooth: float) -> str:
+    figures = f"corners are off by {error:.2g} px, in a typical photograph by {typical:.2g}"
+    why = (
+        "the target was bent another way"
+        if smooth > SMOOTH
+        else "it may be blurred, or the target or the camera moved"
+    )
+    return f"{figures}: {why}"
+
+
+def _smooth_share(known: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray, " m"]:
+    """The share of each view's squared residuals that patterns of order 2 and 3 over the board explain."""
+    patterns = np.concatenate(patterns_over_views(known, points, orders=(2, 3)), axis=2)
+    explained = ((known.errors[:, None] @ patterns)[:, 0] ** 2).sum(1)
+    return explained / np.maximum((known.errors**2).sum(1), 1e-300)
+
+
+def precious_among(
+    detections: Detections, within: Float[ndarray, " m"], without: Float[ndarray, " m"]
+) -> tuple[tuple[str, str], ...]:
+    """Images of the photographs that alone show some place of the frame, with that place.
+
+    Args:
+        within, without: squared error of each view with it and without it, px^2.
+    """
+    corners = np.array([len(view.ids) for view in detections.views], dtype=float)
+    if len(corners) < FEWEST_VIEWS:
+        return ()
+    own, foreseen = np.sqrt(within / corners), np.sqrt(without / corners)
+    typical = float(np.nanmedian(foreseen))
+    alone = np.isnan(foreseen) | ((foreseen > ALONE * own) & (foreseen > GAINED * typical))
+    return tuple(
+        (view.image, place_of(view.pixels, detections.image_size))
+        for view, is_alone in zip(detections.views, alone, strict=True)
+        if is_alone
+    )

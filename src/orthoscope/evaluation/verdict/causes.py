@@ -1,0 +1,196 @@
+"""What can be wrong, worst first: one table.  A verdict names the first that holds, and no other.
+
+The order is that of what hides what: a formula that cannot follow the lens before the target, both before
+photographs that are merely too few; two cameras in one folder before everything that a single camera could
+have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import isnan
+from typing import NamedTuple
+
+from orthoscope.evaluation.verdict.grades import WIDE, Grade
+from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
+
+__all__ = ["CAUSES", "FEW_VIEWS", "Cause", "listed"]
+
+UNTOLD = 4  # photographs: with fewer, no error can be told
+FEW_VIEWS = 8
+LEVEL = 12.0  # degrees: photographs with less tilt are all frontal
+NOTICED = 0.5  # of the corners' noise: cameras that differ by less are as good as one
+NEGLIGIBLE_PX = 0.05
+STIFF = 0.5  # of the corners' noise: what a free lens may miss
+WILD = 0.005  # of the corners: chance makes hardly any
+SPARSE = 0.75  # of the frame's cells: with corners in fewer, it is corners that are missing
+NAMED = 3  # images that a sentence lists
+
+
+class Cause(NamedTuple):
+    """Something that may limit a camera.
+
+    Args:
+        name: in a file and in tests.
+        holds: whether it does.
+        allows: the best grade with it.
+        says: the sentence, with figures; a clause that can follow "Usable: ...".
+    """
+
+    name: str
+    holds: Callable[[Situation], bool]
+    allows: Callable[[Situation], Grade]
+    says: Callable[[Situation], str]
+
+
+def listed(images: Sequence[str]) -> str:
+    """`a, b and c`, or `a, b, c and 5 more`."""
+    shown = list(images[:NAMED])
+    if len(images) > NAMED:
+        return f"{', '.join(shown)} and {len(images) - NAMED} more"
+    return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
+
+
+def _matters(s: Situation) -> bool:
+    return bool(s.disagree) and s.differ_px > max(NOTICED * s.noise_px, NEGLIGIBLE_PX)
+
+
+def _lens_is_missed(s: Situation) -> bool:
+    """A free lens is as stiff as its data made it, and misses a little of every lens by intent."""
+    return s.lens_px > (STIFF * s.noise_px if s.lens == "free" else 0.0)
+
+
+def _of_photographs(s: Situation) -> Grade:
+    apart = 2.0 * s.differ_px if s.groups else s.differ_px
+    if s.disagree == "shutter" and not s.groups:  # the camera is one; what the shutter did is in its error
+        return Grade.USABLE
+    return Grade.NO if apart > s.coarse_px else Grade.USABLE
+
+
+KINDS = {
+    "zoom": lambda s: (
+        f"the focal length changes between them by about {100 * s.differ_focal:.2g} % (zoom or focus)"
+    ),
+    "centre": lambda s: (
+        f"the image moves on the sensor by about {s.differ_centre_px:.2g} px (a stabiliser or cropping)"
+    ),
+    "shutter": lambda s: "they were read row by row while camera or target moved (a rolling shutter)",
+}
+
+
+def _photographs(s: Situation) -> str:
+    how = (
+        f"{listed(s.groups[1])} are of another than {listed(s.groups[0])}"
+        if s.groups
+        else KINDS[s.disagree](s)
+    )
+    return f"the photographs do not agree on one camera: {how}"
+
+
+def _open(s: Situation) -> bool:
+    """Whether the camera is not known well enough, and not for lack of corners in some part of the frame."""
+    return s.error_px > FINE_PX or (s.held < WIDE and s.covered >= SPARSE)
+
+
+def _as_far_as_known(s: Situation) -> Grade:
+    return Grade.USABLE if s.error_px > FINE_PX else Grade.REGION
+
+
+def _as_far_as_it_goes(s: Situation) -> Grade:
+    """What is wrong is in the predicted error, so it counts by that."""
+    return Grade.USABLE if s.error_px > FINE_PX else Grade.GOOD
+
+
+CAUSES: tuple[Cause, ...] = (
+    Cause(
+        "few",
+        lambda s: s.views < UNTOLD or isnan(s.error_px),
+        lambda s: Grade.NO if s.views < 2 or isnan(s.error_px) else Grade.USABLE,
+        lambda s: f"{_photograph(s.views)} cannot tell how far off it is",
+    ),
+    Cause(
+        "lens",
+        lambda s: s.beyond > 0,
+        lambda s: Grade.NO,
+        lambda s: (
+            f"the lens formula ends {s.fold:.0f} degrees from the axis, before {s.beyond} of the corners"
+        ),
+    ),
+    Cause(
+        "corners",
+        lambda s: s.wild > WILD * s.corners,
+        lambda s: Grade.USABLE,
+        lambda s: f"{s.wild} of {s.corners} corners are far from where the others put them",
+    ),
+    Cause("photographs", _matters, _of_photographs, _photographs),
+    Cause(
+        "lens",
+        _lens_is_missed,
+        _as_far_as_it_goes,
+        lambda s: (
+            f"{_formula(s)} cannot follow this lens: at the same places of every photograph"
+            f" corners are off by {s.lens_px:.2g} px"
+        ),
+    ),
+    Cause(
+        "target",
+        lambda s: s.target_px > 0.0,
+        _as_far_as_it_goes,
+        lambda s: f"{_target(s)}: in every photograph its corners are off by the same {s.target_mm:.2g} mm",
+    ),
+    Cause(
+        "views",
+        lambda s: bool(s.suspects),
+        lambda s: Grade.GOOD,
+        lambda s: "; ".join(f"in {image} {what}" for image, what in s.suspects[:1]),
+    ),
+    Cause(
+        "tilt",
+        lambda s: _open(s) and s.tilt < LEVEL,
+        _as_far_as_known,
+        lambda s: "the target faced the camera in all photographs, so its focal length is open",
+    ),
+    Cause(
+        "few",
+        lambda s: _open(s) and s.distinct < FEW_VIEWS,
+        _as_far_as_known,
+        lambda s: (
+            f"{_photograph(s.distinct)} are few"
+            if s.distinct == s.views
+            else f"of {s.views} photographs only {s.distinct} differ from one another"
+        ),
+    ),
+    Cause("open", _open, _as_far_as_known, lambda s: "these photographs do not tell it better"),
+    Cause(
+        "solver",
+        lambda s: not s.converged and s.error_px > FINE_PX,
+        lambda s: Grade.USABLE,
+        lambda s: "the search for the camera did not come to an end",
+    ),
+    Cause(
+        "region",
+        lambda s: s.held < WIDE,
+        lambda s: Grade.REGION,
+        lambda s: f"too few corners were seen {s.place}",
+    ),
+)
+
+
+def _photograph(count: int) -> str:
+    return "one photograph" if count == 1 else f"{count} photographs"
+
+
+def _formula(s: Situation) -> str:
+    return (
+        "the free lens, as stiff as these photographs made it,"
+        if s.lens == "free"
+        else f"the formula {s.lens}"
+    )
+
+
+def _target(s: Situation) -> str:
+    return (
+        "the target is not flat, or not as described"
+        if s.shape in ("", "flat")
+        else "the target is not of the shape that was found"
+    )

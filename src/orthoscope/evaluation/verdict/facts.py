@@ -1,0 +1,157 @@
+"""The facts about a calibration that its verdict is made from."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from orthoscope.evaluation.coverage import emptiest_place, share_covered
+from orthoscope.evaluation.disagreement import Disagreement
+from orthoscope.evaluation.groups import Groups
+from orthoscope.evaluation.misfit.f_test import is_misfit
+from orthoscope.evaluation.misfit.misfit import Misfit
+from orthoscope.evaluation.reference_fit import ReferenceFit
+from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
+from orthoscope.evaluation.verdict.situation import FINE_PX, Situation, coarse_px
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.geometry.arrays import ndarray
+from orthoscope.solve.least_squares import Status
+from orthoscope.targets.detections import Detections
+
+__all__ = ["Findings", "corners_beyond", "distinct_views", "share_within", "situation_of"]
+
+# in an image of 1000 pixels: views whose corners are apart by less (median) are the same photograph again
+COPIED_PX = 1.0
+USUAL_WIDTH = 1000.0
+DISTINCT = 0.7  # of the views: with more copies among them, that they agree says nothing
+WILD = 12.0  # times the median residual: farther off than heavy tails reach
+WILD_PX = 0.5
+
+
+class Findings(NamedTuple):
+    """What tests found out about a calibration; None where there was nothing to test by."""
+
+    calibration: Calibration
+    views: tuple[ViewError, ...]
+    misfit: Misfit
+    reference: ReferenceFit | None
+    disagreement: Disagreement
+    groups: Groups | None
+
+
+def situation_of(found: Findings) -> Situation:
+    """The facts."""
+    calibration, reference, disagreement = found.calibration, found.reference, found.disagreement
+    detections, settings = calibration.detections, calibration.settings
+    views, distinct = len(detections.views), distinct_views(detections)
+    target, lens = found.misfit.target, found.misfit.lens
+    images = [view.image for view in detections.views]
+    known = reference.known if reference else None
+    suspects = suspects_among(found.views, known, detections.target.points)
+    told = distinct > DISTINCT * views  # copies agree with each other whatever is true
+    return Situation(
+        method=calibration.method,
+        lens=str(settings.get("lens", "")),
+        shape=calibration.target_shape.kind,
+        base=str(settings.get("base", "")),
+        through=str(settings.get("through", "")),
+        loss=str(settings.get("loss", "")),
+        views=views,
+        distinct=distinct,
+        converged=calibration.status == Status.CONVERGED,
+        error_px=_error(reference, disagreement, views / distinct),
+        coarse_px=coarse_px(detections.image_size),
+        share=share_within(reference, np.sqrt(views / distinct)),
+        covered=share_covered(calibration),
+        place=emptiest_place(detections),
+        noise_px=float(np.sqrt(2.0 * known.noise)) if known else calibration.rms_px,
+        tilt=_tilt(calibration),
+        corners=detections.corners,
+        wild=_wild(calibration, {image for image, _ in suspects}),
+        beyond=corners_beyond(calibration),
+        fold=float(np.degrees(calibration.camera.lens.field_angle)),
+        disagree=disagreement.kind,
+        differ_px=disagreement.by_px,
+        differ_focal=disagreement.focal,
+        differ_centre_px=disagreement.centre_px,
+        groups=tuple(tuple(images[i] for i in group) for group in found.groups[:2]) if found.groups else (),
+        lens_px=lens.test.systematic_px if told and is_misfit(lens.test, views) else 0.0,
+        target_px=target.test.systematic_px if told and is_misfit(target.test, views) else 0.0,
+        target_mm=1e3 * target.test.systematic_px / target.pixels_per_metre,
+        suspects=suspects,
+        precious=precious_among(detections, reference.own_squares, reference.own_left_out)
+        if reference
+        else (),
+    )
+
+
+def corners_beyond(calibration: Calibration) -> int:
+    """How many corners lie where the lens formula has ended before them."""
+    points = calibration.target_points
+    views = zip(calibration.camera_from_target, calibration.detections.views, strict=True)
+    seen = np.concatenate([pose.apply(points[view.ids]) for pose, view in views])
+    return int(np.isnan(calibration.camera.project(seen)[:, 0]).sum())
+
+
+def distinct_views(detections: Detections) -> int:
+    """How many photographs differ from all those before them."""
+    near = COPIED_PX * max(1.0, max(detections.image_size) / USUAL_WIDTH)
+    tables = np.full((len(detections.views), len(detections.target.points), 2), np.nan)
+    for table, view in zip(tables, detections.views, strict=True):
+        table[view.ids] = view.pixels
+    kept: list[ndarray] = []
+    for table in tables:
+        apart = [np.hypot(*(table - other).T) for other in kept]
+        if not any(np.isfinite(gap).sum() >= 4 and np.nanmedian(gap) < near for gap in apart):
+            kept.append(table)
+    return len(kept)
+
+
+def share_within(reference: ReferenceFit | None, larger: float = 1.0, limit: float = FINE_PX) -> float:
+    """The share of the frame, where the camera has an image, over which its predicted error is below a limit.
+
+    Args:
+        larger: by how much the error is larger than predicted.
+    """
+    if reference is None:
+        return 0.0
+    known = reference.error.far[np.isfinite(reference.error.far)]
+    return float((larger * known <= limit).mean()) if known.size else 0.0
+
+
+def _error(reference: ReferenceFit | None, disagreement: Disagreement, copies: float) -> float:
+    """The camera error: that of the camera, and of how cameras differ from photograph to photograph.
+
+    Args:
+        copies: photographs for each that is distinct; copies add nothing, and each was counted.
+    """
+    if reference is None:
+        return float("nan")
+    apart = 0.0 if disagreement.kind == "shutter" else disagreement.by_px
+    return float(np.hypot(np.sqrt(copies) * reference.error.seen_px, apart))
+
+
+def _wild(calibration: Calibration, suspects: set[str]) -> int:
+    """How many corners are far from where the others put them, photographs that do not belong left aside."""
+    sizes = [np.hypot(*e.T) for e in calibration.residuals()]
+    limit = max(WILD * float(np.median(np.concatenate(sizes))), WILD_PX)
+    views = calibration.detections.views
+    return sum(
+        int((size > limit).sum())
+        for size, view in zip(sizes, views, strict=True)
+        if view.image not in suspects
+    )
+
+
+def _tilt(calibration: Calibration) -> float:
+    """The angle between the target's normal and the line of sight, degrees, in the photograph that has most
+    but one.
+    """
+    points = calibration.detections.target.points
+    tilts = []
+    for pose, view in zip(calibration.camera_from_target, calibration.detections.views, strict=True):
+        sight = pose.apply(points[view.ids].mean(0)[None])[0]
+        cosine = float(np.abs(pose.rotation[:, 2] @ sight) / np.linalg.norm(sight))
+        tilts.append(np.degrees(np.arccos(min(cosine, 1.0))))
+    return float(np.sort(tilts)[-2]) if len(tilts) > 1 else tilts[0]

@@ -1,0 +1,64 @@
+"""The four grades, and the figures that define them: one table, and nowhere else.
+
+A grade is given by how far off the camera is where corners were seen (error_px), and by the share of the
+frame over which it is off by FINE_PX at most and corners were seen.  What is known to be wrong (causes.py)
+can lower it, never raise it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import NamedTuple
+
+from orthoscope.evaluation.verdict.situation import COARSE_PX, FINE_PX, Situation
+
+__all__ = ["GRADES", "WIDE", "Grade", "by_error", "lower"]
+
+WIDE = 0.7  # of the frame: what is left is corners of it that a board rarely reaches
+
+
+class Grade(StrEnum):
+    """How far a camera may be trusted, best first."""
+
+    GOOD = "good"
+    REGION = "good within a region"
+    USABLE = "usable"
+    NO = "do not use"
+
+
+class _Row(NamedTuple):
+    grade: Grade
+    says: str
+    holds: Callable[[Situation], bool]
+
+
+GRADES: tuple[_Row, ...] = (
+    _Row(
+        Grade.GOOD,
+        f"off by {FINE_PX:g} px at most where corners were seen: {100 * WIDE:.0f} % of the frame or more",
+        lambda s: s.error_px <= FINE_PX and s.held >= WIDE,
+    ),
+    _Row(
+        Grade.REGION,
+        f"off by {FINE_PX:g} px at most where corners were seen: less of the frame",
+        lambda s: s.error_px <= FINE_PX,
+    ),
+    _Row(
+        Grade.USABLE,
+        f"off by more, or with a fault that is named, but by {COARSE_PX:g} px (in 1000) at most",
+        lambda s: s.error_px <= s.coarse_px,
+    ),
+    _Row(Grade.NO, "off by more than that, or nobody knows by how much", lambda s: True),
+)
+
+
+def by_error(s: Situation) -> Grade:
+    """The best grade that the predicted error allows."""
+    return next(row.grade for row in GRADES if row.holds(s))
+
+
+def lower(one: Grade, other: Grade) -> Grade:
+    """The worse of two grades."""
+    order = list(Grade)
+    return max(one, other, key=order.index)

@@ -1,0 +1,96 @@
+"""What a verdict is made from: plain facts about a calibration, whatever they were found by.
+
+A verdict is a function of these facts and of nothing else, so a test can go through all that may occur.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["COARSE_PX", "FINE_PX", "NOTHING_KNOWN", "Situation", "coarse_px"]
+
+FINE_PX = 0.5  # a camera that is off by no more serves everyone: corners are found to about that
+COARSE_PX = 3.0  # in an image of 1000 pixels: a camera that is off by more serves nobody
+USUAL_WIDTH = 1000.0
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The facts.
+
+    Args:
+        method, lens, base, through: what the calibration was made by, as it is called again; empty where it
+            has no such setting.
+        shape: of the target, that it came to.
+        views: photographs that were used.
+        distinct: of these, those that are not near-copies of another.
+        converged: whether the search for the camera came to an end.
+        error_px: how far off the camera is, rms over the seen part; NaN where nothing says.
+        coarse_px: error above which it is of no use.
+        share: of the frame over which it is off by FINE_PX at most, by what is predicted; where no corners
+            were seen that rests on a formula which nothing has tested.
+        covered: share of the frame's cells that corners were seen in.
+        place: of the frame where corners are missing, in words.
+        noise_px: of a found corner, per point.
+        tilt: of the target against the line of sight, degrees, in the photograph that has most but one.
+        corners: that were used.
+        wild: of these, far from where the others put them.
+        loss: how errors count, where the method has such a setting.
+        beyond: corners that lie where the lens formula has ended.
+        fold: degrees from the axis at which it ends.
+        disagree: how photographs differ (disagreement.py); empty where they agree.
+        differ_px: how far their cameras' images are apart.
+        differ_focal: standard deviation of their focal lengths, a share.
+        differ_centre_px: of their principal points.
+        groups: images of each of two cameras; empty where there are none.
+        lens_px: what the lens does at the same places in every photograph and its formula does not; 0 where
+            there is no such thing.
+        target_px, target_mm: how far the target's corners are from where they are said to be; 0 where there
+            is no such thing.
+        suspects: images whose own corners fit badly, with what is wrong.
+        precious: images that nothing else could replace, with the place that they alone show.
+    """
+
+    method: str = "decoupled"
+    lens: str = "free"
+    shape: str = "flat"
+    base: str = "brown"
+    through: str = "free"
+    views: int = 15
+    distinct: int = 15
+    converged: bool = True
+    error_px: float = 0.1
+    coarse_px: float = COARSE_PX
+    share: float = 1.0
+    covered: float = 1.0
+    place: str = "in the middle"
+    noise_px: float = 0.1
+    tilt: float = 40.0
+    corners: int = 800
+    wild: int = 0
+    loss: str = ""
+    beyond: int = 0
+    fold: float = float("nan")
+    disagree: str = ""
+    differ_px: float = 0.0
+    differ_focal: float = 0.0
+    differ_centre_px: float = 0.0
+    groups: tuple[tuple[str, ...], ...] = ()
+    lens_px: float = 0.0
+    target_px: float = 0.0
+    target_mm: float = 0.0
+    suspects: tuple[tuple[str, str], ...] = ()
+    precious: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def held(self) -> float:
+        """The share of the frame for which the camera answers: it is off by little, and corners were seen."""
+        return min(self.share, self.covered)
+
+
+NOTHING_KNOWN = Situation(error_px=float("nan"), share=0.0)
+
+
+def coarse_px(image_size: tuple[int, int]) -> float:
+    """The error above which a camera of this image size is of no use, pixels."""
+    return COARSE_PX * max(1.0, max(image_size) / USUAL_WIDTH)

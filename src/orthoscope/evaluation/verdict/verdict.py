@@ -1,0 +1,85 @@
+"""The verdict in words: how far off the camera is, where that holds, at most one limit, what to do."""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import NamedTuple
+
+from orthoscope.evaluation.verdict.advice import Advice, advice_on
+from orthoscope.evaluation.verdict.causes import CAUSES
+from orthoscope.evaluation.verdict.grades import Grade, by_error, lower
+from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
+
+__all__ = ["Verdict", "verdict_on"]
+
+HEADS = {
+    Grade.GOOD: "Good",
+    Grade.REGION: "Good within a region",
+    Grade.USABLE: "Usable",
+    Grade.NO: "Do not use this camera",
+}
+
+
+class Verdict(NamedTuple):
+    """What a user should know before anything else.
+
+    Args:
+        grade: how far the camera may be trusted.
+        cause: the name of what limits it; empty where nothing does.
+        far: how far off it is, and where that holds.
+        limit: what limits it, or empty.
+        advice: what to do, or empty.
+    """
+
+    grade: Grade
+    cause: str
+    far: str
+    limit: str
+    advice: str
+
+    def __str__(self) -> str:
+        return " ".join(part for part in (self.far, self.limit, self.advice) if part)
+
+
+def verdict_on(s: Situation) -> Verdict:
+    """The verdict on a situation."""
+    held = [cause for cause in CAUSES if cause.holds(s)]
+    grade = by_error(s)
+    for cause in held:
+        grade = lower(grade, cause.allows(s))
+    first = held[0] if held else None
+    limit = _sentence(first.says(s)) if first else ""
+    advice: Advice | None = advice_on(first.name if first else "", s)
+    return Verdict(
+        grade, first.name if first else "", _far(grade, s), limit, advice.says(s) if advice else ""
+    )
+
+
+def _far(grade: Grade, s: Situation) -> str:
+    if isnan(s.error_px):
+        return f"{HEADS[grade]}: nothing says how far off it is."
+    told = f"{HEADS[grade]}: off by about {px(s.error_px)} px where corners were seen"
+    if grade in (Grade.GOOD, Grade.REGION):
+        told += f", and by less than {FINE_PX:g} px over {_share(s.held)} of the frame"
+    return told + "."
+
+
+def px(value: float) -> str:
+    """Pixels to two digits that mean something."""
+    return (
+        f"{value:.0f}"
+        if value >= 10.0
+        else f"{value:.2g}"
+        if value >= 0.095
+        else f"{value:.2f}"
+        if value >= 0.01
+        else "0.01"
+    )
+
+
+def _share(share: float) -> str:
+    return "all" if share > 0.995 else f"{100 * share:.0f} %"
+
+
+def _sentence(clause: str) -> str:
+    return clause[:1].upper() + clause[1:] + "."

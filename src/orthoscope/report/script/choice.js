@@ -1,0 +1,55 @@
+/* What was tried. */
+function choice() {
+  const rows = panels.choice.candidates,
+    top = Math.max(...rows.map(r => r.heldOut + (r.error || 0))) * 1.05;
+  new Plot("choice", {
+    zooms: false,
+    labels: ["held-out rms (px per point)", ""],
+    gridX: true,
+    margin: { l: 190, r: 16, t: 8, b: 42 },
+    range: () => ({ x: [0, top], y: [-0.6, rows.length - 0.4] }),
+    height: () => 26 * rows.length + 10,
+    axes() {
+      const g = this.ctx,
+        { x, y, w, h } = this.box;
+      g.strokeStyle = css("--line");
+      g.fillStyle = css("--soft");
+      g.textAlign = "center";
+      g.textBaseline = "top";
+      for (const v of ticks(this.shown.x, w / 70)) {
+        line(g, this.X(v), y, this.X(v), y + h);
+        g.fillText(short(v), this.X(v), y + h + 6);
+      }
+      g.textBaseline = "bottom";
+      g.fillText(this.labels[0], x + w / 2, this.tall - 4);
+      g.textAlign = "right";
+      g.textBaseline = "middle";
+      rows.forEach((r, i) => {
+        g.fillStyle = css(r.loses === 0 ? "--ink" : "--soft");
+        g.font = `${r.loses === 0 ? "600 " : ""}12px ${css("--sans")}`;
+        g.fillText(r.name, x - 8, this.Y(i));
+      });
+      g.font = `12px ${css("--sans")}`;
+    },
+    paint: p => {
+      const g = p.ctx;
+      rows.forEach((r, i) => {
+        g.strokeStyle = g.fillStyle = css(r.loses === 0 ? "--amber" : "--blue");
+        g.lineWidth = 2;
+        if (r.error) line(g, p.X(r.heldOut - r.error), p.Y(i), p.X(r.heldOut + r.error), p.Y(i));
+        g.beginPath();
+        g.arc(p.X(r.heldOut), p.Y(i), r.loses === 0 ? 6 : 4.5, 0, 7);
+        g.fill();
+      });
+    },
+    find: (p, x, y) => {
+      const i = Math.round(p.atY(y)),
+        r = rows[i];
+      return r
+        ? {
+            text: `${r.name}: ${px(r.heldOut)}${r.error ? ` ± ${px(r.error)}` : ""}, ${r.loses === 0 ? "taken" : r.loses == null ? "" : r.loses > 0 ? `loses ${px(r.loses)}` : `would gain ${px(-r.loses)}`}`,
+          }
+        : null;
+    },
+  });
+}
