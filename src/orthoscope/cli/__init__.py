@@ -22,6 +22,7 @@ from orthoscope.cli.given_files import keeping_inputs
 from orthoscope.cli.paper import paper
 from orthoscope.cli.report import report
 from orthoscope.cli.simulate import simulate
+from orthoscope.cli.terminal import printable
 from orthoscope.cli.undistort import undistort
 from orthoscope.version import __version__
 
@@ -90,7 +91,11 @@ def _leave(error: Exception) -> None:
     """Exit with the message and code of an error of ours; any other is a defect and keeps its traceback."""
     from orthoscope.geometry.arrays import CalibrationError, InputError
 
+    if str(error) == "embedded null byte":  # as Python says of a path, before any check of ours
+        error = InputError(
+            "a path has a NUL in it; expected the name of a file or folder. Choose another place."
+        )
     if not isinstance(error, InputError | CalibrationError):
         raise error
-    click.echo(f"orthoscope: {error}", err=True)
+    click.echo(f"orthoscope: {printable(str(error))}", err=True)
     sys.exit(2 if isinstance(error, InputError) else 1)

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from orthoscope.cli import options
+from orthoscope.cli.terminal import printable
 
 __all__ = ["straighten", "undistort"]
 
@@ -177,7 +178,7 @@ def straighten(
             paths, camera, out, view=view, executor=executor, progress=progress
         )
     for name, reason in failed:
-        click.echo(f"left out   {name}: {reason}", err=True)
+        click.echo(printable(f"left out   {name}: {reason}"), err=True)
     if not written:
         raise InputError(f"none of {len(paths)} photographs could be straightened; {failed[0][1]}")
     return written, failed
