@@ -68,7 +68,9 @@ def test_a_board_is_found_whole_with_its_ids_at_any_roll_and_tilt(board, rendere
 
 
 @every_board
-@pytest.mark.parametrize("side", ["left", "right", "top", "bottom"])
+@pytest.mark.parametrize(
+    "side", ["left", *(pytest.param(side, marks=pytest.mark.slow) for side in ("right", "top", "bottom"))]
+)
 def test_a_board_with_a_side_out_of_the_picture_is_found_as_far_as_it_is_in_it(board, side):
     target = target_of(board)
     low, high = target.points.min(0)[:2], target.points.max(0)[:2]

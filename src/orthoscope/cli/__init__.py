@@ -22,6 +22,7 @@ from orthoscope.cli.given_files import keeping_inputs
 from orthoscope.cli.paper import paper
 from orthoscope.cli.report import report
 from orthoscope.cli.simulate import simulate
+from orthoscope.cli.target import target
 from orthoscope.cli.terminal import printable
 from orthoscope.cli.undistort import undistort
 from orthoscope.version import __version__
@@ -53,6 +54,7 @@ for verb in (
     tools,
     report,
     simulate,
+    target,
     demo,
     paper,
 ):

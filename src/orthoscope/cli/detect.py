@@ -23,6 +23,11 @@ Example:
 @options.target
 @options.image_size
 @options.jobs
+@click.option(
+    "--max-megapixels",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Photographs that say they are larger are set aside unread; 500 by default.",
+)
 @options.cluster
 @click.option(
     "-o",
@@ -38,6 +43,7 @@ def detect(
     target: str,
     image_size: tuple[int, int] | None,
     jobs: int | None,
+    max_megapixels: float | None,
     cluster: str | None,
     out: Path,
     as_json: bool,
@@ -52,7 +58,12 @@ def detect(
     check_folder(out.parent)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         detections, _ = detections_from(
-            photos, target, image_size=image_size, executor=executor, progress=progress
+            photos,
+            target,
+            image_size=image_size,
+            executor=executor,
+            progress=progress,
+            most_megapixels=max_megapixels,
         )
     save(detections, out)
     width, height = detections.image_size

@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 
+import click
+
 from orthoscope.formats.corners_vnl import read_vnl
 from orthoscope.formats.own.json import load_detections
 from orthoscope.geometry.arrays import InputError
@@ -27,6 +29,7 @@ def detections_from(
     jobs: int | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    most_megapixels: float | None = None,
 ) -> tuple[Detections, dict[str, Path]]:
     """Detections, and where the photograph of each name is (empty where corners were found before).
 
@@ -50,9 +53,12 @@ def detections_from(
             )
         return read_vnl(paths[0], target, image_size), {}
     from orthoscope.detection.detect import detect
-    from orthoscope.files.images import names_of, photographs
+    from orthoscope.files.films import FILMS
+    from orthoscope.files.images import MOST_MEGAPIXELS, names_of, passed_over, photographs
 
-    files = photographs(paths)
-    return detect(files, target, jobs=jobs, executor=executor, progress=progress), dict(
-        zip(names_of(files), files, strict=True)
-    )
+    files = photographs(paths, also=FILMS)
+    most = MOST_MEGAPIXELS if most_megapixels is None else most_megapixels
+    found = detect(files, target, jobs=jobs, executor=executor, progress=progress, most_megapixels=most)
+    if others := passed_over(paths, also=FILMS):
+        click.echo(f"passed over {', '.join(f'{count} {end}' for end, count in others.items())}", err=True)
+    return found, dict(zip(names_of(files), files, strict=True))

@@ -144,7 +144,8 @@ target: Decorator = click.option(
     metavar="SPEC",
     help=(
         "What was photographed: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g."
-        " chessboard:9x6:25mm."
+        " chessboard:9x6:25mm; charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:legacy], counting squares;"
+        " aprilgrid:COLUMNSxROWS:TAG:SPACING, counting tags; or a target.yaml of Kalibr."
     ),
 )
 image_size: Decorator = click.option(

@@ -36,6 +36,7 @@ LOOKED_AT = 2  # lattices of each copy: a chequered shirt may be larger than the
 FEWEST = 6  # corners of a part of a board
 ENOUGH = 0.25  # of the board's corners hang together, or it is not worth while to try other finders
 TOO_MANY = 1.5  # times the board's corners: a tiled floor, not a board
+FLOOR = 6  # times the board's corners in one lattice: whatever it is, no further copy is looked at
 REPAIRS = 2  # times that a corner off its neighbours' lines is sought again
 OFF, OFF_NO_SADDLE = (0.1, 6.0), (0.04, 3.0)  # a corner is off: steps at least, times the usual stray
 USUAL_STRAY = 0.03  # of a step, at most
@@ -64,6 +65,8 @@ def see_chessboard(grey: ndarray, board: Chessboard) -> Sight | Unseen:
     parts, hanging, open_ = [], 0, False
     for found, copy in _hanging_together(grey):
         hanging = max(hanging, len(found.pixels))
+        if hanging > FLOOR * board.columns * board.rows:
+            break
         grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST else None
         if grid is None:
             continue

@@ -9,18 +9,20 @@ from __future__ import annotations
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from orthoscope.detection.chessboard import board_size
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import check_can_be_seen, see
-from orthoscope.files.images import names_of, photographs, read_image
+from orthoscope.files.images import MOST_MEGAPIXELS
+from orthoscope.files.pictures import Given, Picture, pictures
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.detections import Detections, SetAside, View
@@ -45,44 +47,56 @@ class _Look(NamedTuple):
 
 
 def detect(
-    paths: str | PathLike[str] | Iterable[str | PathLike[str]],
+    photographs: Given,
     target: Target | str,
     *,
     jobs: int | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    most_megapixels: float = MOST_MEGAPIXELS,
 ) -> Detections:
     """Find the target in photographs.
 
-    paths: files, folders and globs. target: or its description, such as `chessboard:9x6:25mm`. jobs:
-    photographs looked at at once (as many as there are cores), or an executor of one's own. progress: called
-    with (done, total, name). Raises InputError where paths or target are wrong, CalibrationError where no
-    photograph shows the target.
+    Args:
+        photographs: files, folders, globs and films; or arrays (h,w) or (h,w,3), alone, several or by name.
+        target: or its description, such as `chessboard:9x6:25mm`.
+        jobs: photographs looked at at once, as many as there are cores.
+        executor: of one's own, instead of jobs.
+        progress: called with (done, total, name).
+        most_megapixels: larger photographs are set aside unread.
+    Raises:
+        InputError: photographs or target are wrong.
+        CalibrationError: no photograph shows the target.
     """
     target = parse_target(target) if isinstance(target, str) else target
     check_can_be_seen(target)
-    files = photographs(paths)
-    names = names_of(files)
+    given = pictures(photographs)
+    names = [picture.name for picture in given]
     looks: list[_Look] = []
     with nullcontext(executor) if executor else ThreadPoolExecutor(jobs or os.cpu_count()) as run:
-        places = [file.absolute() for file in files]  # an executor's workers may stand in another folder
-        for look in run.map(_look, places, [target] * len(files)):
+        asked = [_placed(picture) for picture in given]
+        for look in run.map(_look, asked, [target] * len(given), [most_megapixels] * len(given)):
             looks.append(look)
             if progress:
-                progress(len(looks), len(files), names[len(looks) - 1])
+                progress(len(looks), len(given), names[len(looks) - 1])
     size = _usual_size(looks)
     views, aside = _sorted_out(names, looks, size)
     if not views or size is None:
-        raise CalibrationError(_nothing_found(files, names, looks, target, aside))
+        raise CalibrationError(_nothing_found(given, looks, target, aside))
     return Detections(target, size, tuple(views), tuple(aside))
 
 
-def _look(file: Path, target: Target) -> _Look:
+def _placed(picture: Picture) -> Picture:
+    """The picture with the whole path of its file: an executor's workers may stand in another folder."""
+    return replace(picture, source=picture.source.absolute()) if isinstance(picture.source, Path) else picture
+
+
+def _look(picture: Picture, target: Target, most_megapixels: float) -> _Look:
     """One photograph, from its file to its corners (ids and pixels)."""
     try:
-        grey = read_image(file, grey=True)
+        grey = picture.grey(most_megapixels=most_megapixels)
     except InputError as error:
-        return _Look(None, "", None, str(error).removeprefix(f"{file} "))
+        return _Look(None, "", None, str(error).removeprefix(f"{picture.source} "))
     size = (grey.shape[1], grey.shape[0])
     found = see(grey, target)
     return _Look(
@@ -129,16 +143,14 @@ def _sorted_out(
     return views, aside
 
 
-def _nothing_found(
-    files: list[Path], names: list[str], looks: list[_Look], target: Target, aside: list[SetAside]
-) -> str:
+def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, aside: list[SetAside]) -> str:
     """Why no photograph could be used, and which board seems to be there instead."""
-    readable = [file for file, look in zip(files, looks, strict=True) if look.size]
+    readable = [picture for picture, look in zip(given, looks, strict=True) if look.size]
     reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:LISTED])
     if more := len(aside) - LISTED:
         reasons += f"\n  and {more} more" if more > 0 else ""
     if not readable:
-        return f"none of {len(files)} photographs can be read; expected images. Look at them:{reasons}"
+        return f"none of {len(given)} photographs can be read; expected images. Look at them:{reasons}"
     told = f"{target.name} was found in none of {len(readable)} photographs; expected it in most of them."
     if isinstance(target.board, Chessboard) and (board := _board_instead(readable, target.board)):
         columns, rows = board
@@ -151,9 +163,9 @@ def _nothing_found(
     return f"{told} {advice}:{reasons}"
 
 
-def _board_instead(files: list[Path], target: Chessboard) -> tuple[int, int] | None:
+def _board_instead(given: list[Picture], target: Chessboard) -> tuple[int, int] | None:
     """The size of the board that most of a few photographs show, where it is not the target's."""
-    few = files[:: max(1, len(files) // LOOKED_AT)][:LOOKED_AT]
-    seen = Counter(board for file in few if (board := board_size(read_image(file, grey=True))))
+    few = given[:: max(1, len(given) // LOOKED_AT)][:LOOKED_AT]
+    seen = Counter(board for picture in few if (board := board_size(picture.grey(most_megapixels=np.inf))))
     others = {board: count for board, count in seen.items() if sorted(board) != sorted(target.grid)}
     return max(others, key=lambda board: others[board], default=None)

@@ -1,7 +1,8 @@
-"""Photographs: which files they are, read upright as 8-bit pictures, and written as wholes.
+"""Photographs: which files they are, read as 8-bit pictures of the sensor's pixels, and written as wholes.
 
-OpenCV decodes; it turns pictures upright by their EXIF tag, but before version 5 says nothing of a JPEG that
-is cut off (it comes back half grey), so the end that JPEG and PNG must have is looked for first, chunk by
+A camera's lens does not turn with the telephone, so a tag that says how it was held turns nothing. OpenCV
+decodes; before version 5 it says nothing of a JPEG that is cut off (it comes back half grey), so the end that
+JPEG and PNG must have is looked for first, chunk by
 chunk: thumbnails have ends of their own, and telephones put whole films after the picture. 16-bit pictures
 are brought to 8 bits by the fewest bits that hold their brightest value: cameras fill 10, 12 or 14 bits of
 the 16, and dividing by 257 would turn those nearly black.
@@ -12,6 +13,7 @@ from __future__ import annotations
 import glob
 import re
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from os import PathLike
@@ -20,12 +22,29 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from orthoscope.files.image_headers import size_in_header
 from orthoscope.files.whole_files import read_bytes, write_bytes
 from orthoscope.geometry.arrays import InputError, ndarray
 
-__all__ = ["SUFFIXES", "checked_whole", "names_of", "photographs", "quiet", "read_image", "write_image"]
+__all__ = [
+    "MOST_MEGAPIXELS",
+    "SUFFIXES",
+    "checked_whole",
+    "names_of",
+    "pages_in",
+    "passed_over",
+    "photographs",
+    "quiet",
+    "read_image",
+    "to_grey",
+    "write_image",
+]
 
-SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".gif")
+PAGED = (".tif", ".tiff", ".webp", ".gif")  # may hold several pictures
+MOST_MEGAPIXELS = 500.0  # a file that says it holds more is hardly a photograph
+STRETCHED = (0.005, 0.995)  # quantiles
+SAMPLED = 200_000  # pixels that the quantiles are taken from
 JPEG, PNG = b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"  # how they begin
 MARKER = re.compile(
     rb"\xff[^\x00\xd0-\xd7\xff]"
@@ -34,11 +53,15 @@ MARKER = re.compile(
 Path_ = str | PathLike[str]
 
 
-def photographs(paths: Path_ | Iterable[Path_]) -> list[Path]:
+def photographs(paths: Path_ | Iterable[Path_], *, also: tuple[str, ...] = ()) -> list[Path]:
     """The image files that files, folders (not the folders in them) and globs name, each once, `left2` before
     `left10`.
 
-    Raises InputError where a path is missing, a glob matches nothing or a folder holds no photograph.
+    Args:
+        paths: one or several.
+        also: endings of other files to take besides.
+    Raises:
+        InputError: a path is missing, a glob matches nothing or a folder holds no photograph.
     """
     given = [paths] if isinstance(paths, str | PathLike) else list(paths)
     if not given:
@@ -47,9 +70,22 @@ def photographs(paths: Path_ | Iterable[Path_]) -> list[Path]:
         )
     found: dict[Path, Path] = {}
     for path in given:
-        for file in _expanded(Path(path)):
+        for file in _expanded(Path(path), (*SUFFIXES, *also)):
             found.setdefault(file.resolve(), file)
     return list(found.values())
+
+
+def passed_over(paths: Path_ | Iterable[Path_], *, also: tuple[str, ...] = ()) -> dict[str, int]:
+    """How many files of each ending the named folders hold that are no photographs."""
+    given = [paths] if isinstance(paths, str | PathLike) else list(paths)
+    folders = {Path(path).resolve() for path in given if Path(path).is_dir()}
+    others = [
+        file.suffix.lower() or "(none)"
+        for folder in folders
+        for file in folder.iterdir()
+        if file.is_file() and not file.name.startswith(".") and file.suffix.lower() not in (*SUFFIXES, *also)
+    ]
+    return dict(sorted(Counter(others).items()))
 
 
 def names_of(files: Iterable[Path]) -> list[str]:
@@ -64,16 +100,29 @@ def names_of(files: Iterable[Path]) -> list[str]:
     return [str(file) for file in files]
 
 
-def read_image(path: Path_, *, grey: bool = False) -> ndarray:
-    """A photograph, upright: uint8 (h,w) where grey, else (h,w,3) blue, green, red.
+def read_image(
+    path: Path_, *, grey: bool = False, page: int = 0, most_megapixels: float = MOST_MEGAPIXELS
+) -> ndarray:
+    """A photograph as its sensor saw it: uint8 (h,w) where grey, else (h,w,3) blue, green, red.
 
-    Raises InputError where the file is missing, empty, no image or cut off.
+    Args:
+        path: of the file.
+        grey: one channel, its contrast stretched where it has more than 8 bits.
+        page: of a file that holds several pictures, from 0.
+        most_megapixels: a file that says it holds more is refused before memory is taken.
+    Raises:
+        InputError: the file is missing, empty, no image, cut off or too large.
     """
-    content = checked_whole(read_bytes(Path(path)), path)
+    content = _content(Path(path), most_megapixels)
     flags = (cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) | cv2.IMREAD_ANYDEPTH
+    flags |= cv2.IMREAD_IGNORE_ORIENTATION
     with _QUIET:
         try:
-            image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
+            if page:
+                _, pages = cv2.imdecodemulti(np.frombuffer(content, dtype=np.uint8), flags)
+                image = pages[page] if page < len(pages) else None
+            else:
+                image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
         except cv2.error:
             image = None
     if image is None:
@@ -81,7 +130,59 @@ def read_image(path: Path_, *, grey: bool = False) -> ndarray:
             f"{path} is not an image that can be read; expected one of {', '.join(SUFFIXES)}. Convert it or"
             " leave it out."
         )
-    return _to_8_bits(image)
+    return to_grey(image) if grey else _to_8_bits(image)
+
+
+def pages_in(path: Path) -> int:
+    """How many pictures a file holds; 1 for kinds that hold one, and where it cannot be told."""
+    if path.suffix.lower() not in PAGED:
+        return 1
+    try:
+        content = _content(path, MOST_MEGAPIXELS)
+        with _QUIET:
+            _, pages = cv2.imdecodemulti(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
+    except (InputError, cv2.error):
+        return 1
+    return max(1, len(pages))
+
+
+def to_grey(image: ndarray) -> ndarray:
+    """A picture (h,w) or (h,w,c) of any depth as (h,w) uint8.
+
+    More than 8 bits are stretched between the quantiles of 0.5 % and 99.5 %, with a tenth of that to spare: a
+    thermal picture uses few of its levels, and one infinite pixel says nothing of the others.
+    """
+    if image.ndim == 3:
+        colours = image[..., :3].astype(np.float32 if image.dtype != np.uint8 else np.uint8)
+        image = cv2.cvtColor(colours, cv2.COLOR_BGR2GRAY) if image.shape[2] >= 3 else image[..., 0]
+    if image.dtype == np.uint8:
+        return np.ascontiguousarray(image)
+    values = image.astype(np.float32)
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return np.zeros(image.shape, dtype=np.uint8)
+    low, high = np.quantile(finite[:: max(1, len(finite) // SAMPLED)], STRETCHED)
+    spare = 0.1 * (high - low)
+    low, high = low - spare, max(high + spare, low + 1e-12)
+    stretched = np.nan_to_num(values, nan=low, posinf=high, neginf=low)
+    return np.clip(np.rint((stretched - low) * np.float32(255.0 / (high - low))), 0, 255).astype(np.uint8)
+
+
+def _content(path: Path, most_megapixels: float) -> bytes:
+    """The bytes of a file that can be an image."""
+    if path.exists() and not path.is_file():
+        raise InputError(
+            f"{path} is no file but a folder, pipe or device; expected a photograph. Leave it out."
+        )
+    content = read_bytes(path)
+    width, height = size_in_header(content) or (0, 0)
+    if width * height > most_megapixels * 1e6:
+        raise InputError(
+            f"{path} says that it is {width}x{height}, {width * height / 1e6:.0f} megapixels; expected at"
+            f" most {most_megapixels:g}. Allow more (most_megapixels; detect --max-megapixels) if it is a"
+            " photograph."
+        )
+    return checked_whole(content, path)
 
 
 def checked_whole(content: bytes, path: Path_) -> bytes:
@@ -120,19 +221,25 @@ def write_image(path: Path_, image: ndarray) -> None:
     write_bytes(Path(path), content.tobytes())
 
 
-def _expanded(path: Path) -> list[Path]:
+def _expanded(path: Path, suffixes: tuple[str, ...]) -> list[Path]:
     """The files that one path means."""
     if path.is_dir():
-        files = [file for file in path.iterdir() if _is_photograph(file)]
+        files = [file for file in path.iterdir() if _is_photograph(file, suffixes)]
         if not files:
             raise InputError(
                 f"folder {path} holds no photograph; expected files ending in {', '.join(SUFFIXES)}. Name the"
                 " folder that has them."
             )
         return sorted(files, key=_natural)
+    if path.exists() and not path.is_file():
+        raise InputError(
+            f"{path} is a pipe or a device; expected a photograph, a folder or a glob. Name a file."
+        )
     if path.exists():
         return [path]
-    files = [file for name in glob.glob(str(path), recursive=True) if _is_photograph(file := Path(name))]
+    files = [
+        file for name in glob.glob(str(path), recursive=True) if _is_photograph(file := Path(name), suffixes)
+    ]
     if not files:
         raise InputError(
             f"{path} does not exist; expected a photograph, a folder of photographs or a glob that matches"
@@ -141,9 +248,9 @@ def _expanded(path: Path) -> list[Path]:
     return sorted(files, key=_natural)
 
 
-def _is_photograph(file: Path) -> bool:
+def _is_photograph(file: Path, suffixes: tuple[str, ...]) -> bool:
     """By its name; a file that is named itself is believed to be one."""
-    return file.suffix.lower() in SUFFIXES and not file.name.startswith(".") and file.is_file()
+    return file.suffix.lower() in suffixes and not file.name.startswith(".") and file.is_file()
 
 
 def _natural(path: Path) -> list[tuple[int, int, str]]:
@@ -190,7 +297,7 @@ def _to_8_bits(image: ndarray) -> ndarray:
     """
     if image.dtype == np.uint8:
         return image
-    brightest = float(np.nanmax(image, initial=0.0))
+    brightest = float(np.max(image, initial=0.0, where=np.isfinite(image)))
     if np.issubdtype(image.dtype, np.integer):
         brightest = float(2 ** max(8, int(brightest).bit_length()) - 1)
     scaled = np.nan_to_num(image.astype(np.float32)) * np.float32(255.0 / max(brightest, 1e-12))

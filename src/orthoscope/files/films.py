@@ -1,0 +1,85 @@
+"""Frames of a film that are worth looking at: sharp ones that differ, some tens of them.
+
+A film is read once from its first frame to its last, whatever it says of its length, in stretches of equal
+length: of each the sharpest frame is kept, if it differs from the one kept before. When more are kept than
+are wanted, every other one goes and stretches become twice as long. Sharpness is the mean square of the
+Laplacian of a small copy; two frames differ where small copies do by more than noise.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from orthoscope.geometry.arrays import InputError, ndarray
+
+__all__ = ["FILMS", "Frame", "frames_of"]
+
+FILMS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".wmv")
+MOST = 60  # frames that are kept
+STRETCH = 4  # frames of the first stretches
+SMALL = (40, 30)  # px, of the copies that are compared: so small that blur does not show
+DIFFERS = 2.0  # grey levels, mean over a small copy
+
+
+class Frame(NamedTuple):
+    """seconds: when.  picture: (h,w) uint8."""
+
+    seconds: float
+    picture: ndarray
+
+
+class _Kept(NamedTuple):
+    frame: Frame
+    sharpness: float
+    small: ndarray
+    stretch: int
+
+
+def frames_of(path: Path, *, most: int = MOST) -> list[Frame]:
+    """The frames of a film that are worth looking at, in order.
+
+    Args:
+        path: of the film.
+        most: frames at most.
+    Raises:
+        InputError: it cannot be read as a film.
+    """
+    film = cv2.VideoCapture(str(path))
+    rate = film.get(cv2.CAP_PROP_FPS)
+    rate = rate if np.isfinite(rate) and 0.1 < rate < 10_000 else 30.0
+    kept: list[_Kept] = []
+    length, number = STRETCH, 0
+    while True:
+        more, picture = film.read()
+        if not more:
+            break
+        kept = _with(kept, picture, number / rate, number // length)
+        if len(kept) > most:
+            kept, length = [entry._replace(stretch=entry.stretch // 2) for entry in kept[::2]], 2 * length
+        number += 1
+    film.release()
+    if not number:
+        raise InputError(f"{path} cannot be read as a film; expected one of {', '.join(FILMS)}. Convert it.")
+    return [entry.frame for entry in kept]
+
+
+def _with(kept: list[_Kept], picture: ndarray, seconds: float, stretch: int) -> list[_Kept]:
+    """What is kept after this frame: it takes the last one's place where it is sharper and of the same
+    stretch.
+    """
+    grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
+    copy = cv2.resize(grey, (16 * SMALL[0], 16 * SMALL[1]), interpolation=cv2.INTER_AREA)
+    sharpness = float((cv2.Laplacian(copy, cv2.CV_32F) ** 2).mean())
+    small = cv2.resize(copy, SMALL, interpolation=cv2.INTER_AREA).astype(np.int16)
+    new = _Kept(Frame(seconds, grey), sharpness, small, stretch)
+    same = kept and kept[-1].stretch == stretch
+    before = kept[:-1] if same else kept
+    if before and np.abs(before[-1].small - small).mean() < DIFFERS:
+        return kept
+    if same and kept[-1].sharpness >= sharpness:
+        return kept
+    return [*before, new]

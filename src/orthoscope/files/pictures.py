@@ -1,0 +1,89 @@
+"""What is handed in to be looked at: photographs, the pages of a file, frames of films, arrays; each with a
+name.
+
+A frame's name is its film's and its time, `walk.mp4@12.345s`; a page's its file's and its number,
+`scan.tif#2`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from orthoscope.files.films import FILMS, frames_of
+from orthoscope.files.images import names_of, pages_in, photographs, read_image, to_grey
+from orthoscope.geometry.arrays import InputError, ndarray
+
+__all__ = ["Given", "Picture", "pictures"]
+
+Given = str | PathLike[str] | ndarray | Iterable[str | PathLike[str] | ndarray] | Mapping[str, ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One picture, in memory or still in its file.
+
+    Args:
+        name: what its view will be called.
+        source: the file, or the picture itself, (h,w) or (h,w,3).
+        page: of the file, from 0.
+    """
+
+    name: str
+    source: Path | ndarray
+    page: int = 0
+
+    def grey(self, *, most_megapixels: float) -> ndarray:
+        """The picture, (h,w) uint8.
+
+        Raises:
+            InputError: it cannot be read, or is larger than so many million pixels.
+        """
+        if isinstance(self.source, Path):
+            return read_image(self.source, grey=True, page=self.page, most_megapixels=most_megapixels)
+        return to_grey(self.source)
+
+
+def pictures(given: Given) -> list[Picture]:
+    """Every picture of files, folders, globs, films and arrays.
+
+    Args:
+        given: one of these or several; arrays by name, or numbered as they come.
+    Raises:
+        InputError: a path leads to no picture, or an array is none.
+    """
+    if isinstance(given, Mapping):
+        return [Picture(str(name), _checked(np.asarray(array))) for name, array in given.items()]
+    if isinstance(given, ndarray) and given.ndim in (2, 3) and (given.ndim == 2 or given.shape[2] in (3, 4)):
+        given = [given]
+    entries = [given] if isinstance(given, str | PathLike) else list(given)
+    arrays = [entry for entry in entries if isinstance(entry, ndarray)]
+    paths = [entry for entry in entries if not isinstance(entry, ndarray)]
+    digits = max(2, len(str(len(arrays))))
+    found = [Picture(f"picture{i:0{digits}d}", _checked(array)) for i, array in enumerate(arrays, 1)]
+    files = photographs(paths, also=FILMS) if paths or not arrays else []
+    for name, file in zip(names_of(files), files, strict=True):
+        found += _of_file(name, file)
+    return found
+
+
+def _of_file(name: str, file: Path) -> list[Picture]:
+    if file.suffix.lower() in FILMS:
+        return [Picture(f"{name}@{frame.seconds:.3f}s", frame.picture) for frame in frames_of(file)]
+    pages = pages_in(file)
+    if pages < 2:
+        return [Picture(name, file)]
+    return [Picture(f"{name}#{page + 1}", file, page) for page in range(pages)]
+
+
+def _checked(array: ndarray) -> ndarray:
+    if array.ndim not in (2, 3) or array.size == 0 or (array.ndim == 3 and array.shape[2] not in (1, 3, 4)):
+        raise InputError(
+            f"a picture has shape {array.shape}; expected (height, width) or (height, width, 3). Hand in each"
+            " on its own."
+        )
+    return array
