@@ -57,7 +57,7 @@ release-check: $(VENV)/installed
 	$(BIN)/python -m build --quiet --outdir dist
 	$(BIN)/twine check --strict dist/*
 	$(PYTHON) -m venv build/bare
-	build/bare/bin/pip install --quiet dist/*.whl
+	build/bare/bin/pip install --quiet "$$(ls dist/*.whl)[opencv]"
 	cd build && bare/bin/python ../tests/helpers/run_readme.py ../README.md
 
 clean:

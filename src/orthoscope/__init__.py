@@ -102,7 +102,14 @@ __all__ = sorted([*_ROOM_OF, "__version__"])  # pyright: ignore[reportUnsupporte
 def __getattr__(name: str) -> Any:
     if name not in _ROOM_OF:
         raise AttributeError(f"orthoscope has no {name!r}; it has {', '.join(__all__)}")
-    return getattr(importlib.import_module(f"orthoscope.{_ROOM_OF[name]}"), name)
+    try:
+        return getattr(importlib.import_module(f"orthoscope.{_ROOM_OF[name]}"), name)
+    except ModuleNotFoundError as error:
+        from orthoscope.geometry.missing import how_to_install
+
+        if (told := how_to_install(error)) is None:
+            raise
+        raise ModuleNotFoundError(told, name=error.name) from error
 
 
 def __dir__() -> list[str]:

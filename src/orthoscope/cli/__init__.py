@@ -93,13 +93,12 @@ def main() -> None:
             f"orthoscope: what is printed or written finds no place ({error.strerror}); free some.", err=True
         )
         sys.exit(2)
-    except ImportError as error:
-        if error.name != "cv2":
+    except ModuleNotFoundError as error:
+        from orthoscope.geometry.missing import how_to_install
+
+        if (told := how_to_install(error)) is None:
             raise
-        tell(
-            "orthoscope: photographs need OpenCV, which is not installed; say pip install opencv-python-headless.",
-            err=True,
-        )
+        tell(f"orthoscope: {told}", err=True)
         sys.exit(2)
     except MemoryError:
         tell(
@@ -116,6 +115,10 @@ def _leave(error: Exception) -> None:
 
     from orthoscope.geometry.arrays import CalibrationError, InputError
 
+    if str(error) == "embedded null byte":  # as Python says of a path, before any check of ours
+        error = InputError(
+            "a path has a NUL in it; expected the name of a file or folder. Choose another place."
+        )
     if isinstance(error, BrokenExecutor):
         tell(
             "orthoscope: a process that worked on this was ended from outside, perhaps for want of memory; run"

@@ -40,21 +40,13 @@ def _files(given: Any) -> Iterator[Path]:
         yield from _named(str(given))
 
 
-def _pictures() -> set[str]:
-    """Suffixes of photographs and films; who names a folder is about to load OpenCV anyway."""
-    from orthoscope.files.images import SUFFIXES
-    from orthoscope.straight.film import CODECS
-
-    return {*SUFFIXES, *CODECS}
-
-
 def _named(text: str) -> Iterator[Path]:
     import glob
 
     try:
         path = Path(text)
         if path.is_dir():
-            yield from (file for file in path.iterdir() if file.suffix.lower() in _pictures())
+            yield from _pictures_in(path)
         elif path.exists():
             yield path
         elif "#" in text:
@@ -63,3 +55,11 @@ def _named(text: str) -> Iterator[Path]:
             yield from map(Path, glob.glob(text, recursive=True))
     except (OSError, ValueError):  # no path at all, such as a lens with its coefficients
         return
+
+
+def _pictures_in(folder: Path) -> Iterator[Path]:
+    """The photographs and films of a folder; OpenCV is needed for those, and loaded for nothing else."""
+    from orthoscope.files.images import SUFFIXES
+    from orthoscope.straight.film import CODECS
+
+    yield from (file for file in folder.iterdir() if file.suffix.lower() in {*SUFFIXES, *CODECS})

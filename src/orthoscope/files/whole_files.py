@@ -98,6 +98,8 @@ def check_folder(folder: str | Path) -> None:
         InputError: the folder, or the nearest one above it that exists, is a file or may not be written.
     """
     place = Path(folder).absolute()
+    if "\0" in str(folder):
+        raise InputError(f"{_shown(folder)} cannot be written (a name with a NUL); choose another place.")
     try:
         while not place.exists():
             place = place.parent

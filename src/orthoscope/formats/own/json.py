@@ -192,7 +192,9 @@ def _kind(content: bytes, path: str | Path) -> str:
         content.decode()
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{path} is not text (byte {error.start} is no UTF-8); expected JSON that orthoscope wrote."
+            f"{path} is not JSON (byte {error.start} is no UTF-8); expected a file that orthoscope wrote,"
+            f" such as"
+            " calibration.json."
         ) from error
     try:
         header = msgspec.json.decode(content, type=_Header)
