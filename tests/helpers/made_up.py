@@ -6,6 +6,7 @@ import numpy as np
 
 from orthoscope.paper.claims_about_curves import Axis
 from orthoscope.paper.curves import Curve
+from orthoscope.paper.entries import MLDC, NMLDC
 from orthoscope.paper.eq7_searches import Eq7Search
 from orthoscope.paper.trials import Judgement, Outcome
 
@@ -26,12 +27,15 @@ def curve(name: str, test, training=None, *, levels=None, failures: int = 0) -> 
         np.full(len(test), 0.01),
         count,
         np.array([failures] + [0] * (len(test) - 1)),
+        test,
+        np.full(len(test), np.nan),
     )
 
 
 def curves(**test) -> dict[str, Curve]:
-    """Curves by name, from their test errors."""
-    return {name: curve(name, errors) for name, errors in test.items()}
+    """Curves by name, from their test errors; NMLDC and MLDC are the paper's as printed."""
+    names = {"NMLDC": NMLDC, "MLDC": MLDC}
+    return {names.get(name, name): curve(names.get(name, name), errors) for name, errors in test.items()}
 
 
 def ended(fx: float, *, J: float = 1e-20, test_nce: float = 1.5) -> Eq7Search:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from helpers.made_up import curve, curves
+from orthoscope.paper.entries import MLDC, NMLDC
 from orthoscope.paper.figures import nce_figure
 from orthoscope.report.figures import to_svg
 
@@ -19,8 +20,8 @@ def test_both_panels_show_every_contender_and_the_paper_s_three_are_thick():
             for line in axes.lines
             if not str(line.get_label()).startswith("_")
         }
-        assert set(width) == {"FCCM", "NMLDC", "MLDC", "other"}
-        assert width["other"] < min(width[name] for name in ("FCCM", "NMLDC", "MLDC"))
+        assert set(width) == {"FCCM", NMLDC, MLDC, "other"}
+        assert width["other"] < min(width[name] for name in ("FCCM", NMLDC, MLDC))
         assert axes.get_xlabel() == "sigma (px)"
 
 
@@ -33,7 +34,7 @@ def test_errors_of_nothing_have_a_place_on_the_axis():
 
 
 def test_where_no_method_gave_a_camera_the_figure_says_so():
-    figure = nce_figure({"MLDC": curve("MLDC", [np.nan, np.nan])}, level="images", even=True)
+    figure = nce_figure({MLDC: curve(MLDC, [np.nan, np.nan])}, level="images", even=True)
     assert "no method gave a camera" in to_svg(figure, "none")
 
 

@@ -17,6 +17,7 @@ from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
 from orthoscope.paper.documents import documents
+from orthoscope.paper.entries import MLDC, OURS, PAPER
 from orthoscope.paper.photographs import SPLITS, obliqueness, split
 from orthoscope.paper.section4 import Plan, run
 from orthoscope.simulation.render import photographs
@@ -24,7 +25,16 @@ from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.target import chessboard
 
 LEAST = Plan.quick(trials=1)
-CURVES = ["method", "training_nce", "test_nce", "test_nce_standard_error", "trials", "failures"]
+CURVES = [
+    "method",
+    "training_nce",
+    "test_nce",
+    "test_nce_standard_error",
+    "noisy_test_nce",
+    "true_pose_nce",
+    "trials",
+    "failures",
+]
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +81,7 @@ def test_every_figure_and_table_has_its_file(made):
         "lenses_low",
         "lenses_high",
     }
-    assert set(made.texts) == {"paper.html", "trials.csv", "eq7.csv", "table1.csv"} | {
+    assert set(made.texts) == {"paper.html", "trials.csv", "methods.csv", "eq7.csv", "table1.csv"} | {
         f"{name}.csv" for name in figures
     }
 
@@ -79,7 +89,7 @@ def test_every_figure_and_table_has_its_file(made):
 def test_files_have_their_columns_and_a_row_for_each_method_and_level(made):
     rows = rows_of(made.texts["fig2.csv"])
     assert list(rows[0]) == ["noise_px", *CURVES]
-    assert {row["method"] for row in rows} >= {"FCCM", "NMLDC", "MLDC", "FCCM 5 parameters"}
+    assert {row["method"] for row in rows} >= {entry.name for entry in (*PAPER, *OURS)}
     assert {float(row["noise_px"]) for row in rows} == set(LEAST.noise_px)
     assert next(iter(rows_of(made.texts["fig4.csv"])[0])) == "points"
     assert {row["points"] for row in rows_of(made.texts["fig4.csv"])} == {"12", "54"}
@@ -99,9 +109,9 @@ def test_figures_are_the_means_of_the_trials(made):
     trials = [
         row
         for row in rows_of(made.texts["trials.csv"])
-        if (row["study"], row["scene"], row["method"]) == ("noise", "low", "MLDC")
+        if (row["study"], row["scene"], row["method"]) == ("noise", "low", MLDC)
     ]
-    shown = [row for row in rows_of(made.texts["fig2.csv"]) if row["method"] == "MLDC"]
+    shown = [row for row in rows_of(made.texts["fig2.csv"]) if row["method"] == MLDC]
     assert [row["test_nce"] for row in shown] == [
         row["test_nce"] for row in trials
     ]  # one trial is its own mean
@@ -110,7 +120,7 @@ def test_figures_are_the_means_of_the_trials(made):
 def test_eq_7_ends_at_zero_and_at_different_cameras(made):
     ends = [row for row in rows_of(made.texts["eq7.csv"]) if row["scene"] == "low" and row["J"]]
     assert all(float(row["J"]) < 1e-10 for row in ends)
-    assert len({row["fx"] for row in ends}) == len(LEAST.dampings)
+    assert len({row["fx"] for row in ends}) >= len(LEAST.dampings)
 
 
 def test_the_page_needs_nothing_else_and_shows_every_figure(made):
@@ -131,7 +141,7 @@ def test_the_page_needs_nothing_else_and_shows_every_figure(made):
     ):
         assert word in page
     assert page.count("<svg") == 7
-    assert page.count('src="data:image/jpeg') == 4
+    assert page.count('src="data:image/jpeg') == 5
     assert made.headline.replace("'", "&#39;") in page
 
 

@@ -11,8 +11,8 @@ from helpers.made_up import outcome
 from orthoscope.methods import METHODS
 from orthoscope.models.lenses import LENSES
 from orthoscope.paper.curves import curves_of
-from orthoscope.paper.entries import FCCM, FCCM5, PAPER, Entry, every_lens, fair_peers
-from orthoscope.paper.trials import Condition, judged, simulated
+from orthoscope.paper.entries import FCCM, FCCM5, OURS, PAPER, Entry, every_lens, fair_peers
+from orthoscope.paper.trials import Condition, Trial, judged, simulated, simulated_trial
 from orthoscope.targets.detections import View
 
 
@@ -62,11 +62,11 @@ def test_fccm_has_the_errors_of_the_design_in_both_distortions():
         ("low", FCCM5): (0.01, 0.05),
         ("high", FCCM5): (0.01, 0.05),
     }
-    peers = (PAPER[0], fair_peers()[0])
+    peers = (PAPER[0], *(entry for entry in fair_peers() if entry.name == FCCM5))
     for scene in ("low", "high"):
-        data = [simulated(scene, Condition(), seed=0, trial=trial) for trial in range(3)]
+        data = [simulated_trial(scene, Condition(), seed=0, trial=trial) for trial in range(3)]
         for entry in peers:
-            nce = np.mean([judged(entry, *each).test_nce for each in data])
+            nce = np.mean([judged(entry, each).test_nce for each in data])
             low, high = expected[scene, entry.name]
             assert low < nce < high, (scene, entry.name, nce)
 
@@ -74,7 +74,7 @@ def test_fccm_has_the_errors_of_the_design_in_both_distortions():
 def test_a_method_that_fails_is_an_outcome_with_its_reason():
     training, test = simulated("low", Condition(views=1), seed=0, trial=0)
     few = training.only([])
-    judgement = judged(PAPER[0], few, test)
+    judgement = judged(PAPER[0], Trial(few, test, test))
     assert "no view" in judgement.failure
     assert np.isnan(judgement.test_nce)
 
@@ -89,8 +89,8 @@ def test_a_camera_that_does_not_see_the_test_corners_has_failed():
     folding = Entry(
         "FCCM", "fccm", {"lens": "brown:k1"}
     )  # with k1 < 0 its image ends, and farther out there are no rays
-    assert judged(folding, training, test).unseen == 0.0
-    assert "no ray" in judged(folding, training, moved).failure
+    assert judged(folding, Trial(training, test, test)).unseen == 0.0
+    assert "no ray" in judged(folding, Trial(training, moved, moved)).failure
 
 
 def test_every_method_and_lens_is_given_a_chance():
@@ -114,3 +114,28 @@ def test_curves_are_means_over_the_trials_that_gave_a_camera():
     assert_allclose(of.test_error, [np.nan, 1.0])  # sqrt(2) / sqrt(2)
     assert_array_equal(of.failures, [0, 1])
     assert_array_equal(of.trials, [1, 3])
+
+
+def test_both_readings_of_the_error_and_like_with_like():
+    """With true poses a camera that is turned against the true one pays for it; test views as noisy as the
+    training views have the error of the training views.
+    """
+    data = simulated_trial("high", Condition(0.1, (6, 9)), seed=0, trial=0)
+    of_fccm, of_mldc = (judged(entry, data) for entry in (PAPER[0], OURS[0]))
+    assert of_fccm.true_pose_nce > 5.0 * of_fccm.test_nce
+    assert of_mldc.test_nce < of_mldc.true_pose_nce < 0.2 * of_fccm.true_pose_nce
+    assert abs(of_mldc.noisy_test_nce / of_mldc.training_nce - 1.0) < 0.25
+    assert of_mldc.test_nce < 0.2 * of_mldc.training_nce
+    assert abs(of_mldc.centre_x - 304.0) < 3.0  # the simulated 305, less what decentering takes
+    assert of_mldc.lens.startswith("a1=1 a2=")
+
+
+def test_a_method_of_ones_own_is_a_function():
+    def mine(detections, *, lens):
+        return METHODS["fccm"](detections, lens=lens)
+
+    data = simulated_trial("low", Condition(0.1, (3, 4)), seed=0, trial=0)
+    own, theirs = (
+        judged(Entry("x", method, {"lens": "brown:k1"}), data).test_nce for method in (mine, "fccm")
+    )
+    assert own == theirs

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from orthoscope.files.images import write_image
-from orthoscope.formats.own.json import save
+from orthoscope.formats.own.json import load_evaluation, save
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.numbers import ABSENT
 from orthoscope.models.free_lens import FreeLens
@@ -214,7 +214,7 @@ def test_hostile_words_do_not_become_markup(ordinary):
         replace(
             ordinary,
             calibration=calibration,
-            verdict=ordinary.verdict._replace(far=words),
+            verdict=ordinary.verdict._replace(far=words, limit=words, advice=words),
             warnings=(words,),
             suspects=((words, words),),
         )
@@ -225,7 +225,9 @@ def test_hostile_words_do_not_become_markup(ordinary):
 
 def test_the_page_says_the_verdict_the_suspects_the_assumptions_and_how_it_was_made(pages, every_evaluation):
     words = {kind: " ".join(" ".join(Page(page).words).split()) for kind, page in pages.items()}
-    assert str(every_evaluation["ordinary"].verdict) in words["ordinary"]
+    verdict = every_evaluation["ordinary"].verdict
+    assert f"{verdict.grade} Off by about 0.12 px where corners were seen" in words["ordinary"]
+    assert verdict.advice in words["ordinary"]
     assert "its error is 7 times that of the others" in words["suspicious"]
     assert every_evaluation["single"].calibration.assumptions[0] in words["single"]
     for said in (
@@ -394,4 +396,6 @@ def test_a_page_is_made_without_matplotlib_and_without_a_template_language(ordin
     )
     done = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "report.html").read_text() == report_page(ordinary)
+    assert (tmp_path / "report.html").read_text() == report_page(
+        load_evaluation(tmp_path / "evaluation.json")
+    )

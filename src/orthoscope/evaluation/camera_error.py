@@ -54,6 +54,8 @@ class CameraError:
             no image.
         limit_px: where the error is larger the camera is not to be used.
         region: (n,2) pixels, the polygon of the places where it may be.
+        without_px: (m,) of each photograph, by how much the image over the seen part moves without it; NaN
+            where the others cannot tell.
     """
 
     seen_px: float
@@ -69,6 +71,7 @@ class CameraError:
     near: Float[ndarray, "rows columns"]
     limit_px: float
     region: Float[ndarray, "n 2"]
+    without_px: Float[ndarray, " m"]
 
     def trusted(self, pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
         """Which places of the image lie in the region where the camera may be used."""
@@ -99,7 +102,8 @@ class _Variances:
         slopes = _settled(scatter, rays, fitted, distance)
         self.model, self.alike = _spread(slopes, scatter.model), _spread(slopes, scatter.alike)
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
-        self.views = np.nansum(by_view**2, axis=(1, 2)) + _spread(slopes, scatter.prior)
+        self.moved = (by_view**2).sum(1)  # (n, m)
+        self.views = np.nansum(self.moved, axis=1) + _spread(slopes, scatter.prior)
         self.bias = np.zeros(len(rays))
         if rich is not None:
             apart = difference_of_images(rich.camera, scatter.camera, rays, rays[:fitted], distance=distance)
@@ -159,6 +163,7 @@ def predicted_error(
         near=np.sqrt(near.total[part_frame]).reshape(ROWS, COLUMNS),
         limit_px=limit,
         region=_grown(middle, ways, along <= limit),
+        without_px=np.sqrt(far.moved[part_seen].mean(0)),
     )
 
 

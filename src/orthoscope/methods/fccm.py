@@ -30,6 +30,8 @@ from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.blas import with_one_thread
+from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
+from orthoscope.methods.own_centre import CENTRE_OPEN, with_own_centre
 from orthoscope.models.lenses import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
 from orthoscope.solve.losses import LOSSES, Loss
@@ -59,6 +61,7 @@ def fccm(
     detections: Detections,
     *,
     lens: str = AUTO,
+    own_centre: bool = False,
     skew: bool = False,
     loss: str = "linear",
     loss_scale: float = 1.0,
@@ -67,15 +70,26 @@ def fccm(
 ) -> Calibration:
     """Calibrate pin-hole, lens and poses jointly (Zhang's full calibration; the paper's FCCM).
 
-    lens: a name of LENSES, or with the coefficients to free, `brown:k1,k2`; `auto` takes brown, or
-    kannala_brandt for wide views. skew: whether K has one. loss, loss_scale: a name of LOSSES and where it
-    starts to matter, pixels. progress: called after each step with (step, cost). Raises CalibrationError
-    where the views cannot tell the camera, InputError for a setting that is none.
+    Args:
+        detections: of any target.
+        lens: a name of LENSES, or with the coefficients to free, `brown:k1,k2`; `auto` takes brown, or
+            kannala_brandt for wide views.
+        own_centre: whether the lens stands about a centre of its own instead of the principal point
+            (own_centre.py); decentering then is free only where it is named.
+        skew: whether K has one.
+        loss: a name of LOSSES, how large errors count.
+        loss_scale: where the loss starts to matter, pixels.
+        max_steps: of the solver.
+        progress: called after each step with (step, cost).
+    Raises:
+        CalibrationError: the views cannot tell the camera.
+        InputError: a setting is none.
     """
     return in_one_order(
         fit_flat(
             detections,
             lens=lens,
+            own_centre=own_centre,
             skew=skew,
             loss=loss,
             loss_scale=loss_scale,
@@ -89,6 +103,7 @@ def fit_flat(
     detections: Detections,
     *,
     lens: str = AUTO,
+    own_centre: bool = False,
     skew: bool = False,
     loss: str = "linear",
     loss_scale: float = 1.0,
@@ -104,7 +119,7 @@ def fit_flat(
     sample = observations.thinned(SAMPLE)
     bases = StartingCameras(sample, used.target.points, used.image_size, narrowing)
     lens = suited_lens(bases) if lens == AUTO else lens
-    kind, coefficients = parse_lens(lens)
+    kind, coefficients = (parse_centred_lens if own_centre else parse_lens)(lens)
     free = (*narrowing.free, *coefficients)
     check_enough(used, free)
     cost, options = (
@@ -120,6 +135,18 @@ def fit_flat(
             _nearer(estimate, bases, free, cost) for estimate in starts_elsewhere(bases, kind, coefficients)
         ]
         solution = _best(more, observations, used, free, cost, options, best=solution)
+    centred = None
+    if own_centre:
+        centred = with_own_centre(
+            solution.unknowns,
+            observations,
+            used.target.points,
+            narrowing.free,
+            coefficients,
+            loss=cost,
+            options=options,
+        )
+    steps, (solution, free) = solution.steps, centred or (solution, free)
     covariance = shared_covariance(solution.sums, 2 * used.corners)
     check_known(solution, free, covariance, used)
     uncertainty, left_open = told(free, covariance)
@@ -128,12 +155,23 @@ def fit_flat(
         camera_from_target=observations.poses_in_order(solution.unknowns.poses),
         detections=used,
         method="fccm",
-        settings={"lens": lens, "skew": skew, "loss": loss, "loss_scale": loss_scale, "max_steps": max_steps},
+        settings={
+            "lens": lens,
+            "own_centre": own_centre,
+            "skew": skew,
+            "loss": loss,
+            "loss_scale": loss_scale,
+            "max_steps": max_steps,
+        },
         uncertainty=uncertainty,
         status=solution.status.value,
-        steps=solution.steps,
+        steps=steps + solution.steps if centred else steps,
         version=__version__,
-        assumptions=(*narrowing.assumptions, *left_open),
+        assumptions=(
+            *narrowing.assumptions,
+            *((CENTRE_OPEN,) if own_centre and not centred else ()),
+            *left_open,
+        ),
     )
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["MAIN", "Claim", "Verdict", "headline", "share"]
+__all__ = ["MAIN", "Claim", "Verdict", "headline", "of_sentence", "share"]
 
 MAIN = (
     "MLDC has a lower error on test data than FCCM, whose lens and pin-hole only compensate each other on"
@@ -30,14 +30,21 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Claim:
-    """Where it is claimed (a figure), what the paper says, whether that stands here, and the finding, a
-    sentence with its numbers.
+    """What becomes of a sentence of the paper at one place.
+
+    Attributes:
+        where: it is claimed, a figure.
+        paper: the sentence.
+        verdict: whether it stands here.
+        finding: a sentence with its numbers.
+        ours: whether it is judged of a method as we made it work instead of as printed.
     """
 
     where: str
     paper: str
     verdict: Verdict
     finding: str
+    ours: bool = False
 
 
 def share(number: int, of: int) -> Verdict:
@@ -45,21 +52,29 @@ def share(number: int, of: int) -> Verdict:
     return Verdict.HOLDS if number == of else Verdict.PARTLY if number else Verdict.FAILS
 
 
+def of_sentence(claims: Sequence[Claim]) -> Verdict:
+    """What becomes of one sentence that the paper says at several places, of its methods as printed."""
+    verdicts = {claim.verdict for claim in claims if not claim.ours and claim.verdict is not Verdict.OPEN}
+    if not verdicts:
+        return Verdict.OPEN
+    return verdicts.pop() if len(verdicts) == 1 else Verdict.PARTLY
+
+
 def headline(claims: Sequence[Claim]) -> str:
-    """One sentence for the top of the page, from the claims that MLDC is the better one on test data (MAIN);
-    others are passed over.
+    """One sentence for the top of the page, from the claims that MLDC is the better one on test data (MAIN),
+    as printed and repeated.
     """
     told = [claim for claim in claims if claim.paper == MAIN and claim.verdict is not Verdict.OPEN]
-    if not told:
+    printed, repeated = ([claim for claim in told if claim.ours is ours] for ours in (False, True))
+    if not printed:
         return "Whether MLDC is better than FCCM on test data cannot be told from this run."
-    holds = sum(claim.verdict is Verdict.HOLDS for claim in told)
-    partly = sum(claim.verdict is Verdict.PARTLY for claim in told)
-    verdict = share(2 * holds + partly, 2 * len(told))
-    counts = (
-        f"in full in {holds} and in part in {partly} of {len(told)} comparisons"
-        if partly
-        else f"in {holds} of {len(told)} comparisons"
-    )
-    return (
-        f"The paper's main claim, that MLDC is better than FCCM on test data, {verdict}: it stands {counts}."
-    )
+    said = f"The paper's main claim, that MLDC is better than FCCM on test data, {_stands(printed)}"
+    return said + (f"; with its two steps repeated it {_stands(repeated)}." if repeated else ".")
+
+
+def _stands(claims: Sequence[Claim]) -> str:
+    """A verdict with how often it stands."""
+    holds = sum(claim.verdict is Verdict.HOLDS for claim in claims)
+    partly = sum(claim.verdict is Verdict.PARTLY for claim in claims)
+    counts = f"in {holds} of {len(claims)} figures" + (f", in part in {partly}" if partly else "")
+    return f"{share(2 * holds + partly, 2 * len(claims)).value} ({counts})"

@@ -10,10 +10,11 @@ from orthoscope.paper.claims import Claim, Verdict, share
 from orthoscope.paper.eq7_searches import Eq7Search
 from orthoscope.paper.wording import span
 
-__all__ = ["determined", "perfect"]
+__all__ = ["determined", "perfect", "weights_do_not_matter"]
 
 PERFECT = 1e-10  # px^2: J of eq. (7)
 SAME = 0.01  # px: cameras that differ by less are one camera
+ONE_PIXEL = 1.0  # of fx, fy, cx or cy: less does not count as a change
 ACCURATE = 1.0  # NCE of rounding to whole pixels
 
 
@@ -58,3 +59,23 @@ def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
         f"up to {apart:.2g} px apart; test NCE {span(nce)}."
     )
     return Claim(where, paper, verdict, finding)
+
+
+def weights_do_not_matter(where: str, members: Sequence[Eq7Search]) -> Claim:
+    """The outcome does not depend on the weights; members of one scene, those of one damping."""
+    paper = "The computed pin-hole model does not depend on the weights of the terms of eq. (7)."
+    weighed = [member for member in members if member.literal and "weights" in member.name]
+    damped = {member.name.split(", weights")[0] for member in weighed}
+    plain = [member for member in members if member.literal and member.name in damped]
+    ends = [m.judgement for m in (*plain, *weighed) if not m.judgement.failure]
+    if len(ends) < 2 or not plain:
+        return Claim(where, paper, Verdict.OPEN, "Eq. (7) was not searched with other weights.")
+    cameras = np.array([(end.fx, end.fy, end.cx, end.cy) for end in ends])
+    moved = np.abs(cameras[1:] - cameras[0]).max(1)
+    each = ", ".join(
+        f"{m.name.split('weights ')[1]}: {px:.2g} px" for m, px in zip(weighed, moved, strict=False)
+    )
+    verdict = share(int((moved < ONE_PIXEL).sum()), len(moved))
+    return Claim(
+        where, paper, verdict, f"Against weights 1 1 1 the camera moves, with J_PH, J_CR, J_ST at {each}."
+    )

@@ -22,8 +22,10 @@ class Curve:
     """A entry's mean errors at each level, ascending: NCE on training and on test data, and what they rest
     on.
 
-    test_error: standard error of test_nce, NaN with fewer than two trials. trials, failures: how many were
-    made, and how many of them gave no camera.
+    test_error: standard error of test_nce, NaN with fewer than two trials. noisy_test_nce: on test views as
+        noisy as
+    the training views. true_pose_nce: with the true poses of the test views; NaN where no one knows them.
+    trials, failures: how many were made, and how many of them gave no camera.
     """
 
     name: str
@@ -33,6 +35,8 @@ class Curve:
     test_error: Float[ndarray, " n"]
     trials: Int[ndarray, " n"]
     failures: Int[ndarray, " n"]
+    noisy_test_nce: Float[ndarray, " n"]
+    true_pose_nce: Float[ndarray, " n"]
 
 
 Curves = Mapping[str, Curve]
@@ -63,4 +67,11 @@ def _curve(name: str, outcomes: Sequence[Outcome]) -> Curve:
         np.array(spread),
         trials,
         trials - [len(pairs) for pairs in given],
+        *(_means(outcomes, levels, of) for of in ("noisy_test_nce", "true_pose_nce")),
     )
+
+
+def _means(outcomes: Sequence[Outcome], levels: Sequence[float], of: str) -> Float[ndarray, " n"]:
+    """Of one of a judgement's numbers at each level, over the trials that have it."""
+    values = [np.array([getattr(o.judgement, of) for o in outcomes if o.level == level]) for level in levels]
+    return np.array([x[np.isfinite(x)].mean() if np.isfinite(x).any() else np.nan for x in values])

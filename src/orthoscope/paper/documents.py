@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 from orthoscope.paper.claims import headline
 from orthoscope.paper.curves import curves_of
+from orthoscope.paper.entries import PAPER, fair_peers
 from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
     figures_with_claims,
     on_photographs,
     parameters_of,
 )
-from orthoscope.paper.files import curves_csv, members_csv, table_csv, trials_csv
+from orthoscope.paper.files import curves_csv, entries_csv, members_csv, table_csv, trials_csv
 from orthoscope.paper.page import paper_page
 from orthoscope.paper.photographs import straightened
 from orthoscope.paper.section4 import SCENES, Results
@@ -51,6 +52,7 @@ def documents(results: Results, files: Mapping[str, Path] | None = None) -> Docu
         )
         for scene in SCENES
     }
+    texts["methods.csv"] = entries_csv((*PAPER, *fair_peers()), seed=results.plan.seed)
     texts["eq7.csv"] = members_csv(results.members)
     if real:
         texts["table1.csv"] = _table1(results)

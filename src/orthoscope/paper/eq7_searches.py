@@ -10,16 +10,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from orthoscope.paper.entries import MLDC, PAPER, Entry, fair_peers
-from orthoscope.paper.trials import Condition, Judgement, judged, simulated
+from orthoscope.paper.trials import Condition, Judgement, judged, simulated_trial
 
-__all__ = ["DAMPINGS", "Eq7Search", "member", "rivals"]
+__all__ = ["ALIKE", "DAMPINGS", "WEIGHTS", "Eq7Search", "member", "rivals"]
 
 DAMPINGS = (("identity", 1e-4), ("identity", 1e2), ("diagonal", 1e-4), ("diagonal", 1.0))
+# Of J_PH, J_CR and J_ST, tried beside 1, 1, 1 with the first damping.
+WEIGHTS = ((1.0, 0.0, 0.0), (1.0, 1e4, 1.0), (1.0, 1.0, 1e4))
+ALIKE = (1.0, 1.0, 1.0)
 
 
 class Eq7Search(NamedTuple):
-    """Where a search ended: the scene, how it was damped (`damp lambda`; another method's name outside eq.
-    7), J (px^2) and the camera.
+    """Where a search ended: the scene, how it was damped and weighed (another method's name outside eq. 7), J
+    (px^2) and the camera.
     """
 
     scene: str
@@ -48,20 +51,33 @@ class _Costs:
             self.last = (step, cost)
 
 
-def member(scene: str, damp: str, damping: float, *, condition: Condition, seed: int) -> Eq7Search:
-    """The camera at which eq. (7) comes to rest with this damping."""
+def member(
+    scene: str,
+    damp: str,
+    damping: float,
+    weights: tuple[float, float, float] = ALIKE,
+    *,
+    condition: Condition,
+    seed: int,
+) -> Eq7Search:
+    """The camera at which eq. (7) comes to rest with this damping and these weights."""
     costs = _Costs()
-    settings = {"lens": "pfet", "correct": "literal", "damp": damp, "damping": damping, "progress": costs}
-    judgement = judged(Entry(MLDC, "mldc", settings), *simulated(scene, condition, seed=seed, trial=0))
-    return Eq7Search(scene, f"{damp} {damping:g}", costs.last[1], judgement)
+    settings = {
+        "lens": "pfet",
+        "correct": "literal",
+        "damp": damp,
+        "damping": damping,
+        "weights": weights,
+        "progress": costs,
+    }
+    judgement = judged(Entry(MLDC, "mldc", settings), simulated_trial(scene, condition, seed=seed, trial=0))
+    weighed = "" if weights == ALIKE else ", weights " + " ".join(f"{weight:g}" for weight in weights)
+    return Eq7Search(scene, f"{damp} {damping:g}{weighed}", costs.last[1], judgement)
 
 
 def rivals(scene: str, *, condition: Condition, seed: int) -> list[Eq7Search]:
-    """What the other methods make of the same data; MLDC's default is the member nearest to the
-    detections.
-    """
-    data = simulated(scene, condition, seed=seed, trial=0)
-    named = [(entry.name if entry.name != MLDC else "nearest to the detections", entry) for entry in PAPER]
-    named += [(entry.name, entry) for entry in fair_peers()]
-    order = sorted(named, key=lambda pair: pair[1].name != MLDC)
-    return [Eq7Search(scene, name, float("nan"), judged(entry, *data)) for name, entry in order]
+    """What the other methods make of the same data; those of MLDC first."""
+    data = simulated_trial(scene, condition, seed=seed, trial=0)
+    entries = [entry for entry in (*PAPER, *fair_peers()) if entry.name != MLDC]
+    order = sorted(entries, key=lambda entry: entry.method != "mldc")
+    return [Eq7Search(scene, entry.name, float("nan"), judged(entry, data)) for entry in order]

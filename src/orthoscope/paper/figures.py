@@ -1,11 +1,13 @@
 """NCE of every entry, on training and on test data side by side.
 
 Data in, Figure out, in the report's style. The paper's three are thick, with their standard error as a band;
-peers with a fair chance are thin and dashed. Errors span from rounding noise to tens of pixels, so the axis
-is logarithmic, and linear below LINEAR.
+ours are thin, each with dashes and a marker of its own. Errors span from rounding noise to tens of pixels, so
+the axis is logarithmic, and linear below LINEAR.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,8 +23,19 @@ __all__ = ["nce_figure"]
 
 LINEAR = 0.01  # NCE; no one needs to see less than 0.004 px
 PAPER_LOOK = {FCCM: (BLUE, "o"), NMLDC: (ORANGE, "s"), MLDC: (RED, "^")}
-FAIR_COLOURS = (SKY, "#009E73", "#CC79A7", INK)  # the rest of Okabe and Ito's
+# Colour (the rest of Okabe and Ito's, and the paper's again for readings of its methods), dashes and marker
+# of ours.
+OUR_LOOKS = (
+    (RED, (0, (5, 1.5)), "v"),
+    ("#CC79A7", (0, (1, 1.5)), "P"),
+    (ORANGE, (0, (5, 1.5)), "D"),
+    (SKY, (0, (5, 1.5)), "X"),
+    (BLUE, (0, (5, 1.5)), "*"),
+    ("#009E73", (0, (3, 1, 1, 1)), ""),
+    (INK, (0, (1, 1)), ""),
+)
 WIDTH = 7.4  # inches
+TEXT = 9.0  # points, the smallest
 
 
 @styled
@@ -34,11 +47,15 @@ def nce_figure(curves: Curves, *, level: str, even: bool = False, height: float 
     figure = Figure(figsize=(WIDTH, height))
     left, right = figure.subplots(1, 2, sharey=True)
     levels = np.unique(np.concatenate([curve.levels for curve in curves.values()])) if curves else np.empty(0)
-    fair = iter(FAIR_COLOURS * (1 + len(curves) // len(FAIR_COLOURS)))
-    looks = {name: PAPER_LOOK.get(name) or (next(fair), "") for name in curves}
+    ours = iter(OUR_LOOKS * (1 + len(curves) // len(OUR_LOOKS)))
+    looks = {
+        name: (PAPER_LOOK[name][0], "-", PAPER_LOOK[name][1]) if name in PAPER_LOOK else next(ours)
+        for name in curves
+    }
     for axes, title, of in ((left, "training data", "training_nce"), (right, "test data", "test_nce")):
-        axes.set_title(title, loc="left", fontweight="bold")
-        axes.set_xlabel(level)
+        axes.set_title(title, loc="left", fontweight="bold", fontsize=TEXT)
+        axes.set_xlabel(level, fontsize=TEXT)
+        axes.tick_params(labelsize=TEXT)
         axes.grid()
         for name, curve in curves.items():
             _draw(axes, curve, getattr(curve, of), levels, *looks[name], even=even, band=of == "test_nce")
@@ -51,7 +68,8 @@ def nce_figure(curves: Curves, *, level: str, even: bool = False, height: float 
         figure.legend(
             *left.get_legend_handles_labels(),
             loc="outside upper left",
-            ncols=5,
+            ncols=4,
+            fontsize=TEXT,
             handlelength=2.2,
             columnspacing=1.4,
         )
@@ -64,6 +82,7 @@ def _draw(
     nce: ndarray,
     levels: ndarray,
     colour: str,
+    dashes: Any,
     marker: str,
     *,
     even: bool,
@@ -79,10 +98,10 @@ def _draw(
         x,
         nce,
         color=colour,
-        lw=1.7 if thick else 1.0,
-        ls="-" if thick else (0, (4, 2)),
+        lw=1.8 if thick else 1.1,
+        ls=dashes,
         marker=marker or None,
-        ms=4.0,
+        ms=4.5 if thick else 4.0,
         label=curve.name,
         zorder=3 if thick else 2.5,
     )
@@ -98,7 +117,7 @@ def _errors_axis(axes: Axes, curves: Curves) -> None:
     axes.set_yscale("symlog", linthresh=LINEAR, linscale=0.6)
     lowest = float(errors.min(initial=1.0))
     axes.set_ylim(0.7 * lowest if lowest > LINEAR else 0.0, 1.5 * highest)
-    axes.set_ylabel("NCE")
+    axes.set_ylabel("NCE", fontsize=TEXT)
     steps = (
         (1.0, 2.0, 5.0) if lowest > 0.03 * highest else (1.0,)
     )  # numbers between the powers of ten where there are few of these
@@ -115,6 +134,6 @@ def _errors_axis(axes: Axes, curves: Curves) -> None:
             textcoords="offset points",
             ha="right",
             va="bottom",
-            fontsize=6.5,
+            fontsize=TEXT,
             color=GREY,
         )

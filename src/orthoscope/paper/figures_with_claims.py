@@ -12,25 +12,31 @@ import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.paper import claims_about_curves, claims_about_eq7
-from orthoscope.paper.claims import Claim
+from orthoscope.paper.claims import Claim, Verdict
 from orthoscope.paper.claims_about_curves import Axis, Judge
 from orthoscope.paper.curves import Curves, curves_of
-from orthoscope.paper.entries import PAPER
+from orthoscope.paper.entries import MLDC, PAPER
 from orthoscope.paper.photographs import STUDY as PHOTOGRAPHS
 from orthoscope.paper.photographs import obliqueness
 from orthoscope.paper.section4 import PAPERS_NOISE, SCENES, Results
 from orthoscope.paper.trials import Outcome
+from orthoscope.paper.wording import each_of
 
 __all__ = [
+    "Centre",
     "FigureWithClaims",
     "Parameters",
+    "centres",
     "eq7_claims",
     "fair_finding",
     "figures_with_claims",
     "on_photographs",
     "parameters_of",
+    "stable_centre",
     "without_noise",
 ]
+
+STEADY = 2.0  # px: a distortion centre that changes by less from trial to trial is a stable one
 
 NOISE = Axis("noise levels", "{:g} px of noise", column="noise_px", label="sigma (px)")
 POINTS = Axis("numbers of points", "{:g} points", column="points", label="points a view")
@@ -82,6 +88,7 @@ EXHIBITS = (
             NOISE,
             (
                 claims_about_curves.better_on_test,
+                claims_about_curves.better_repeated,
                 claims_about_curves.compensated,
                 claims_about_curves.same_on_test,
                 claims_about_curves.most_sensitive,
@@ -97,7 +104,11 @@ EXHIBITS = (
             "points",
             "NCE against the number of points",
             POINTS,
-            (claims_about_curves.better_on_test, claims_about_curves.greatest_error),
+            (
+                claims_about_curves.better_on_test,
+                claims_about_curves.better_repeated,
+                claims_about_curves.greatest_error,
+            ),
             "Whole rows and columns spread over the board, always with the outermost ones; 15 views, sigma"
             " 0.1 px. Bands: standard error.",
             even=True,
@@ -126,6 +137,7 @@ FIG6 = Kind(
     POINTS,
     (
         claims_about_curves.better_on_test,
+        claims_about_curves.better_repeated,
         claims_about_curves.compensated,
         claims_about_curves.same_on_test,
         claims_about_curves.greatest_error,
@@ -173,7 +185,62 @@ def eq7_claims(results: Results) -> tuple[Claim, ...]:
         claims_about_eq7.determined(f"Eq. (8), {scene}", [m for m in results.members if m.scene == scene])
         for scene in SCENES
     )
-    return (claims_about_eq7.perfect("Eq. (7)", results.members), *of_scenes)
+    of_weights = (
+        claims_about_eq7.weights_do_not_matter(
+            f"Section 3.1, {scene}", [m for m in results.members if m.scene == scene]
+        )
+        for scene in SCENES
+    )
+    return (claims_about_eq7.perfect("Eq. (7)", results.members), *of_scenes, *of_weights)
+
+
+@dataclass(frozen=True)
+class Centre:
+    """Where a method puts the distortion centre over the trials of a scene: means and standard deviations,
+    pixels.
+    """
+
+    scene: str
+    name: str
+    trials: int
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+
+def centres(results: Results) -> list[Centre]:
+    """Of every method that has a centre of its own, at the paper's noise and all points."""
+    most = max((outcome.level for outcome in results.outcomes if outcome.study == "points"), default=0.0)
+    found = []
+    for scene in SCENES:
+        chosen = [o for o in results.outcomes if (o.study, o.scene, o.level) == ("points", scene, most)]
+        for name in dict.fromkeys(outcome.entry for outcome in chosen):
+            of_entry = [o.judgement for o in chosen if o.entry == name and not o.judgement.failure]
+            own = [j for j in of_entry if (j.centre_x, j.centre_y) != (j.cx, j.cy)]
+            if own and len(own) == len(of_entry):
+                x, y = np.array([(j.centre_x, j.centre_y) for j in own]).T
+                found.append(Centre(scene, name, len(own), (_mean(x), _spread(x)), (_mean(y), _spread(y))))
+    return found
+
+
+def stable_centre(results: Results) -> tuple[Claim, ...]:
+    """Whether MLDC's centre is the same over the trials, in each scene."""
+    paper = "The method guarantees stability also when the distortion centre is computed."
+    said = []
+    for scene in SCENES:
+        of_scene = {centre.name: centre for centre in centres(results) if centre.scene == scene}
+        where, mldc = f"Section 5, {scene}", of_scene.get(MLDC)
+        spread = {name: max(centre.x[1], centre.y[1]) for name, centre in of_scene.items()}
+        if mldc is None or not np.isfinite(spread[MLDC]):
+            said.append(Claim(where, paper, Verdict.OPEN, "Fewer than two trials gave a centre."))
+            continue
+        verdict = Verdict.HOLDS if spread[MLDC] < STEADY else Verdict.FAILS
+        finding = (
+            f"Over {mldc.trials} trials its centre is at ({mldc.x[0]:.1f}, {mldc.y[0]:.1f}) px; standard"
+            " deviations of the"
+            f" worse coordinate, px: {each_of(spread)}."
+        )
+        said.append(Claim(where, paper, verdict, finding))
+    return tuple(said)
 
 
 def fair_finding(results: Results) -> str:
@@ -221,6 +288,10 @@ def _parameters(name: str, outcomes: Sequence[Outcome]) -> Parameters:
         _mean(np.array([j.test_nce for j in given])),
         len(outcomes) - len(given),
     )
+
+
+def _spread(values: ndarray) -> float:
+    return float(values.std(ddof=1)) if len(values) > 1 else float("nan")
 
 
 def _mean(values: ndarray) -> float:

@@ -11,17 +11,29 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from orthoscope.paper.curves import Curves
+from orthoscope.paper.entries import Entry
 from orthoscope.paper.eq7_searches import Eq7Search
 from orthoscope.paper.trials import Judgement, Outcome
+from orthoscope.version import __version__
 
-__all__ = ["curves_csv", "members_csv", "table_csv", "trials_csv"]
+__all__ = ["curves_csv", "entries_csv", "members_csv", "table_csv", "trials_csv"]
 
 JUDGEMENT = Judgement._fields
 
 
 def curves_csv(curves: Curves, level: str) -> str:
     """Means over trials, a row for each level and method; level: the name of its column."""
-    columns = (level, "method", "training_nce", "test_nce", "test_nce_standard_error", "trials", "failures")
+    columns = (
+        level,
+        "method",
+        "training_nce",
+        "test_nce",
+        "test_nce_standard_error",
+        "noisy_test_nce",
+        "true_pose_nce",
+        "trials",
+        "failures",
+    )
     return table_csv(
         columns,
         (
@@ -33,6 +45,8 @@ def curves_csv(curves: Curves, level: str) -> str:
                 curve.training_nce,
                 curve.test_nce,
                 curve.test_error,
+                curve.noisy_test_nce,
+                curve.true_pose_nce,
                 curve.trials,
                 curve.failures,
                 strict=True,
@@ -45,6 +59,21 @@ def trials_csv(outcomes: Sequence[Outcome]) -> str:
     """Every trial of every method: a row each."""
     columns = ("study", "scene", "level", "method", "trial", *JUDGEMENT)
     return table_csv(columns, ((o.study, o.scene, o.level, o.entry, o.trial, *o.judgement) for o in outcomes))
+
+
+def entries_csv(entries: Sequence[Entry], *, seed: int) -> str:
+    """What each name stands for: method, settings, the seed of the run and the version that made it."""
+    rows = (
+        (
+            entry.name,
+            entry.method if isinstance(entry.method, str) else entry.method.__name__,
+            " ".join(f"{name}={value}" for name, value in entry.settings.items()),
+            seed,
+            __version__,
+        )
+        for entry in entries
+    )
+    return table_csv(("name", "method", "settings", "seed", "orthoscope"), rows)
 
 
 def members_csv(members: Sequence[Eq7Search]) -> str:

@@ -14,17 +14,19 @@ import numpy as np
 
 from orthoscope.geometry.numbers import ABSENT
 from orthoscope.methods import METHODS
-from orthoscope.paper.claims import Claim, Verdict, headline
+from orthoscope.paper.claims import Claim, Verdict, headline, of_sentence
 from orthoscope.paper.curves import curves_of
-from orthoscope.paper.entries import FCCM
+from orthoscope.paper.entries import PAPER
 from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
     Parameters,
+    centres,
     eq7_claims,
     fair_finding,
     figures_with_claims,
     on_photographs,
     parameters_of,
+    stable_centre,
     without_noise,
 )
 from orthoscope.paper.photographs import SPLITS, Straightened
@@ -51,10 +53,11 @@ class Cell(NamedTuple):
 def paper_page(results: Results, *, straightened: Straightened | None = None) -> str:
     """The page as text; straightened: Fig. 7, where there are photographs."""
     shown, real = figures_with_claims(results), on_photographs(results)
-    others = (*without_noise(results), *eq7_claims(results))
+    others = (*without_noise(results), *eq7_claims(results), *stable_centre(results))
     every = [claim for exhibit in (*shown, *([real] if real else [])) for claim in exhibit.claims] + list(
         others
     )
+    verdicts = [of_sentence(claims) for _, claims in _summary(every)]
     return _template().render(
         version=__version__,
         plan=results.plan,
@@ -68,8 +71,12 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         counts=[
             (verdict.value, number, _tone(verdict))
             for verdict in Verdict
-            if (number := _count(every, verdict))
+            if (number := verdicts.count(verdict))
         ],
+        sentences=len(verdicts),
+        centres=_centres(results),
+        stable=stable_centre(results),
+        printed=[entry.name for entry in PAPER],
         failures=_failures(results),
         tone=_tone,
         figures=[_figure(exhibit) for exhibit in shown],
@@ -148,8 +155,13 @@ def _summary(every: list[Claim]) -> list[tuple[str, list[Claim]]]:
     ]
 
 
-def _count(every: list[Claim], verdict: Verdict) -> int:
-    return sum(claim.verdict is verdict for claim in every)
+def _centres(results: Results) -> list[tuple[str, str, int, str, str]]:
+    """The distortion centre over trials: scene, method, trials, x and y."""
+    return [(c.scene, c.name, c.trials, _with_spread(c.x), _with_spread(c.y)) for c in centres(results)]
+
+
+def _with_spread(pair: tuple[float, float]) -> str:
+    return " ± ".join(_number(value, 2) for value in pair)
 
 
 def _tone(verdict: Verdict) -> str:
@@ -180,13 +192,7 @@ def _members(results: Results) -> list[tuple[str, list[list[str]]]]:
             scene,
             [
                 [
-                    (
-                        f"literal, {m.name}"
-                        if m.literal
-                        else m.name
-                        if m.name.startswith(FCCM) or m.name == "NMLDC"
-                        else f"MLDC, {m.name}"
-                    ),
+                    (f"eq. (7), {m.name}" if m.literal else m.name),
                     f"{m.J:.0e}" if m.literal else ABSENT,
                     *(_number(value, 1) for value in m.judgement[2:6]),
                     _nce(m.judgement.test_nce),

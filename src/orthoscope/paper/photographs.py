@@ -16,10 +16,9 @@ import numpy as np
 
 from orthoscope.files.images import read_image
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
-from orthoscope.methods import calibrate
-from orthoscope.paper.entries import PAPER, fair_peers, with_skew
+from orthoscope.paper.entries import OURS, PAPER, REPEATED, fair_peers, with_skew
 from orthoscope.paper.subgrids import on_subgrid, subgrids
-from orthoscope.paper.trials import Outcome, judged
+from orthoscope.paper.trials import Outcome, Trial, judged
 from orthoscope.straight.undistort import undistort
 from orthoscope.targets.detections import Detections
 
@@ -37,6 +36,7 @@ __all__ = [
 
 SPLITS = 4  # 15 to compute and 5 to test of 20 is one in four
 STUDY = "photographs"
+REPEATED_ENTRY = next(entry for entry in OURS if entry.name == REPEATED)
 FEWEST_VIEWS = 8  # with fewer, a split tests on a single photograph
 
 
@@ -86,7 +86,7 @@ def split_outcomes(
             _points(detections, grid),
             entry.name,
             turn,
-            judged(entry, on_subgrid(training, grid), test),
+            judged(entry, Trial(on_subgrid(training, grid), test, test)),
         )
         for grid in grids
         for entry in with_skew((*PAPER, *fair_peers()))
@@ -105,9 +105,9 @@ def straightened(detections: Detections, files: Mapping[str, Path]) -> Straighte
     chosen = max(views, key=lambda view: float(np.hypot(*(view.pixels - middle).T).mean()))
     image = read_image(files[chosen.image], grey=False)
     pictures: list[tuple[str, ndarray | str]] = []
-    for entry in with_skew(PAPER):
+    for entry in with_skew((*PAPER, REPEATED_ENTRY)):
         try:
-            camera = calibrate(training, method=entry.method, **entry.settings).camera
+            camera = entry.calibrate(training).camera
             pictures.append((entry.name, undistort(image, camera)))
         except (CalibrationError, InputError) as error:
             pictures.append((entry.name, str(error)))

@@ -14,7 +14,7 @@ from typing import Any
 
 from orthoscope.models.lenses import LENSES
 from orthoscope.paper.entries import PAPER, every_lens, fair_peers
-from orthoscope.paper.eq7_searches import DAMPINGS, Eq7Search, member, rivals
+from orthoscope.paper.eq7_searches import ALIKE, DAMPINGS, WEIGHTS, Eq7Search, member, rivals
 from orthoscope.paper.photographs import SPLITS, check_views, grids_of, split_outcomes
 from orthoscope.paper.subgrids import subgrids
 from orthoscope.paper.trials import Condition, Outcome, Study, trial_outcomes
@@ -48,6 +48,7 @@ class Plan:
     images: tuple[int, ...] = (1, 2, 3, 4, 5, 7, 10, 15)
     lenses: tuple[str, ...] = tuple(LENSES)
     dampings: tuple[tuple[str, float], ...] = DAMPINGS
+    weights: tuple[tuple[float, float, float], ...] = WEIGHTS
     eq7: Condition = Condition(PAPERS_NOISE)
     grids: int = GRIDS
     most_table_trials: int = 5
@@ -136,9 +137,13 @@ def run(
         for trial in range(trials)
     ]
     eq7 = [
-        partial(_members, scene, damping, plan.eq7, plan.seed)
+        partial(_members, scene, searched, plan.eq7, plan.seed)
         for scene in SCENES
-        for damping in (*plan.dampings, None)
+        for searched in (
+            *((*damping, ALIKE) for damping in plan.dampings),
+            *((*plan.dampings[0], weights) for weights in plan.weights),
+            None,
+        )
     ]
     real = (
         [
@@ -157,12 +162,15 @@ def run(
 
 
 def _members(
-    scene: str, damping: tuple[str, float] | None, condition: Condition, seed: int
+    scene: str,
+    searched: tuple[str, float, tuple[float, float, float]] | None,
+    condition: Condition,
+    seed: int,
 ) -> list[Eq7Search]:
     """One search of eq. (7), or what the others make of its data."""
-    if damping is None:
+    if searched is None:
         return rivals(scene, condition=condition, seed=seed)
-    return [member(scene, *damping, condition=condition, seed=seed)]
+    return [member(scene, *searched, condition=condition, seed=seed)]
 
 
 def _done(jobs: Sequence[partial], executor: Executor | None, progress: Progress | None) -> list[list[Any]]:

@@ -1,5 +1,4 @@
-"""What the page says first: how far the camera may be trusted, in a word, a sentence and a colour; and what
-to do.
+"""What the page says first: how far the camera may be trusted, in a word, a sentence, a colour; what to do.
 
 Colours never speak alone: each grade has its word and its sign.
 """
@@ -9,38 +8,44 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from orthoscope.evaluation.evaluate import Evaluation
+from orthoscope.evaluation.verdict.grades import Grade
 
 __all__ = ["Headline", "headline", "next_steps"]
 
 LOOKS = {  # of a grade: the class of its colours, and its sign
-    "good": ("good", "\N{CHECK MARK}"),
-    "good within a region": ("region", "\N{WHITE SQUARE WITH ROUNDED CORNERS}"),
-    "usable": ("usable", "\N{ALMOST EQUAL TO}"),
-    "do not use": ("no", "\N{MULTIPLICATION SIGN}"),
+    Grade.GOOD: ("good", "\N{CHECK MARK}"),
+    Grade.REGION: ("region", "\N{WHITE SQUARE}"),
+    Grade.USABLE: ("usable", "\N{ALMOST EQUAL TO}"),
+    Grade.NO: ("no", "\N{MULTIPLICATION SIGN}"),
 }
 
 
 class Headline(NamedTuple):
-    """Args:
-    grade: a word or two.
-    look: the class of its colours.
-    sign: beside the word, for those who do not see the colour.
-    sentence: how far off the camera is, and where.
+    """The verdict as the page opens with it.
+
+    Args:
+        grade: a word or two.
+        look: the class of its colours.
+        sign: beside the word, for those who do not see the colour.
+        sentence: how far off the camera is, and where.
+        limit: what limits it; may be empty.
     """
 
     grade: str
     look: str
     sign: str
     sentence: str
+    limit: str
 
 
 def headline(evaluation: Evaluation) -> Headline:
-    """The verdict as the page opens with it."""
+    """What stands above all else; the grade's word is said once, in colour."""
     verdict = evaluation.verdict
     look, sign = LOOKS[verdict.grade]
-    return Headline(str(verdict.grade), look, sign, f"{verdict.far} {verdict.limit}".strip())
+    said = verdict.far.partition(": ")[2] or verdict.far
+    return Headline(str(verdict.grade), look, sign, said[:1].upper() + said[1:], verdict.limit)
 
 
 def next_steps(evaluation: Evaluation) -> list[str]:
-    """What to do now, most urgent first: what the evaluation advises."""
+    """What to do now: the verdict's advice; empty where the camera is as good as it gets."""
     return [evaluation.verdict.advice] if evaluation.verdict.advice else []

@@ -15,6 +15,7 @@ from orthoscope.report.data.choice import choice
 from orthoscope.report.data.frame_fields import difference, displacement, lens_misfit
 from orthoscope.report.data.lens_curve import curve
 from orthoscope.report.data.target import target_misfit, target_shape
+from orthoscope.report.data.trust import without_each
 
 __all__ = ["PANELS", "Panel"]
 
@@ -47,6 +48,15 @@ PANELS = (
         "Bars: rms in the calibration; dots: held out. Far above the others: blurred, moved or misread. High"
         " only when held out: it shows something that no other photograph does.",
         "Bar chart of the rms residual of each photograph",
+        wide=True,
+    ),
+    Panel(
+        "without-each",
+        "Without each photograph",
+        "How far the camera's image moves, over the part that was seen, where one photograph is left out. Far"
+        " above the others: the camera rests on this one; take more like it.",
+        "Bar chart of how far the camera moves without each photograph",
+        without_each,
         wide=True,
     ),
     Panel(

@@ -62,6 +62,7 @@ def opening(evaluation: Evaluation) -> Html:
         "header",
         tag("p", "orthoscope · calibration report", class_="kicker"),
         tag("h1", grade, " ", tag("span", told.sentence)),
+        tag("p", told.limit, class_="limit") if told.limit else None,
         tag("p", facts, class_="facts"),
         class_=f"grade-{told.look}",
     )

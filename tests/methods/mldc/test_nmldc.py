@@ -20,9 +20,11 @@ from orthoscope.methods.fccm import fccm
 from orthoscope.methods.mldc.line_residuals import Straightness
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.methods.mldc.nmldc import nmldc
+from orthoscope.methods.mldc.straightened_lines import StraightenedLines
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.difference import image_difference
 from orthoscope.models.lenses import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
+from orthoscope.paper.trials import Condition, simulated
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import solve
 from orthoscope.solve.losses import Linear
@@ -248,3 +250,32 @@ def test_a_target_without_rows_is_refused():
 def test_a_loss_that_is_none_is_refused():
     with pytest.raises(InputError, match="expected one of linear"):
         nmldc(corners(NARROW), loss="squares")
+
+
+def test_derivatives_of_lines_in_the_straightened_image_are_exact():
+    observations = Observations.of(some_corners(photographed(NARROW, 3, noise_px=0.5), (0.6, 1.0)))
+    problem = StraightenedLines(
+        observations, SeenLines.of(observations, SMALL), ("k1", "k2", "fx=fy", "cx", "cy")
+    )
+    here = problem.start(NARROW)
+    sums, h = problem.linearise(here, Linear()), 1e-5
+    nothing = np.empty((0, 0))
+    for i, step in enumerate(h * np.array([1e-2, 1e-2, 1.0, 1.0, 1.0])):
+        ahead, back = (
+            problem.linearise(problem.move(here, sign * step * np.eye(5)[i], nothing), Linear()).cost
+            for sign in (1, -1)
+        )
+        assert_allclose(sums.a[i], (ahead - back) / (4 * step), rtol=1e-5)
+
+
+def test_lines_in_the_straightened_image_suffer_most_from_noise():
+    nce = {}
+    for noise in (0.1, 1.0):
+        training, test = simulated("low", Condition(noise, (7, 10)), seed=0, trial=0)
+        for measure in ("photograph", "straight-image"):
+            found = nmldc(training, lens="pfet:a1,a2,a3,a4", measure=measure)
+            nce[noise, measure] = evaluate_on(found.camera, test).nce
+    assert nce[0.1, "straight-image"] < 2 * nce[0.1, "photograph"]  # both alike
+    assert nce[1.0, "straight-image"] > 4 * nce[1.0, "photograph"]
+    with pytest.raises(CalibrationError, match="shrinks that image to a point"):
+        nmldc(training, measure="straight-image")

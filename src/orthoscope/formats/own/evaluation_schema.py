@@ -104,12 +104,16 @@ class CameraErrorFile(FileStruct):
     far: list[list[Number]]
     near: list[list[Number]]
     region: list[tuple[float, float]]
+    without_px: list[Number] = []
 
     @classmethod
     def of(cls, error: CameraError) -> CameraErrorFile:
         numbers = {name: null_for_nan(getattr(error, name)) for name in cls._numbers()}
         region = [(float(x), float(y)) for x, y in error.region]
-        return cls(far=rows_of(error.far), near=rows_of(error.near), region=region, **numbers)
+        without = rows_of(error.without_px)
+        return cls(
+            far=rows_of(error.far), near=rows_of(error.near), region=region, without_px=without, **numbers
+        )
 
     def core(self) -> CameraError:
         numbers: dict[str, Any] = {
@@ -117,7 +121,8 @@ class CameraErrorFile(FileStruct):
             for name in self._numbers()
         }
         far, near = (array_of(rows, len(rows), -1) for rows in (self.far, self.near))
-        return CameraError(far=far, near=near, region=array_of(list(self.region), -1, 2), **numbers)
+        region, without = array_of(list(self.region), -1, 2), array_of(self.without_px, -1)
+        return CameraError(far=far, near=near, region=region, without_px=without, **numbers)
 
     @classmethod
     def _numbers(cls) -> list[str]:

@@ -4,15 +4,16 @@ The unknowns are K, the poses R_j, t_j and, of every view, the n corrected point
 J = w_PH J_PH + w_CR J_CR + w_ST J_ST:
 
     J_PH  (4)  sum |g(K, R_j, t_j, p) - q|^2              the points are where the pin-hole sees the target
-    J_CR  (5)  sum (CR(q1, q2, q3, q4) - CR(p1, p2, p3, p4))^2   four neighbours of a row or column keep
-                                                          their cross-ratio
+    J_CR  (5)  sum (CR(q1, q2, q3, q4) - CR(p1, p2, p3, p4))^2   four corners of a row or column keep the
+                                                          cross-ratio that they have on the target
     J_ST  (6)  sum (a u + b v + c)^2, a^2 + b^2 = 1       points of a row or column lie on the line that is
                                                           nearest to them
 
 The line is refitted wherever J is evaluated, and moves with its points in the derivatives. The paper does not
 print which of the six cross-ratios CR is, nor in what unit; here it is 4/3 for equal distances
 (projective.py), a bare number beside distances in pixels. A view is one block of 6 + 2n unknowns: its pose,
-then u, v of each point. Of a partial board the runs of neighbours that were seen take part.
+then u, v of each point. Of a partial or thinned board every four consecutive corners of a line that were
+seen take part, neighbours or not: the target tells the cross-ratio of any four.
 
 **J does not determine the camera.**  The detected corners are in no term; they are only where the search for
 q starts. For any K, R_j, t_j the points q = g(K, R_j, t_j, p) make all terms 0. So the minimum is a manifold
@@ -32,8 +33,9 @@ from orthoscope.fitting.observations import Observations, Poses
 from orthoscope.fitting.reprojection import POSE, Estimate
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
-from orthoscope.geometry.projective import cross_ratio, cross_ratio_slope, fitted_lines
+from orthoscope.geometry.projective import cross_ratio, cross_ratio_slope
 from orthoscope.methods.mldc.lines_in_views import SeenLines
+from orthoscope.methods.mldc.straightened_lines import distances
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
@@ -80,7 +82,7 @@ class Eq7:
         self._present = observations.present
         self._points = target.points[observations.ids]
         self._lines = lines = SeenLines.of(observations, target)
-        self._runs = _runs(lines)
+        self._runs = lines.present[:, 3:]  # which four consecutive seen corners of a line there are, (l, r)
         with np.errstate(invalid="ignore", divide="ignore"):  # in the padding
             self._ratio = cross_ratio(_fours(self._points[lines.row[:, None], lines.column, :2]))
         self._of_line = (
@@ -90,6 +92,11 @@ class Eq7:
     def start(self, pinhole: Estimate, observations: Observations) -> CorrectedPoints:
         """The paper's start: the pin-hole given, the points where the corners were detected."""
         return CorrectedPoints(pinhole, observations.pixels())
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """How many residuals J_PH, J_CR and J_ST have."""
+        return 2 * int(self._present.sum()), int(self._runs.sum()), int(self._lines.present.sum())
 
     def terms(self, unknowns: CorrectedPoints) -> tuple[float, float, float]:
         """J_PH, J_CR and J_ST, without their weights."""
@@ -158,7 +165,7 @@ class Eq7:
         )
 
     def _cross_ratios(self, q: Float[ndarray, "m n 2"]) -> Terms:
-        """J_CR's: of every run of four neighbours of a line."""
+        """J_CR's: of every four consecutive seen corners of a line."""
         fours = _fours(self._on_lines(q))
         lines, runs = self._runs.shape
         with np.errstate(invalid="ignore", divide="ignore"):  # in the padding
@@ -170,23 +177,8 @@ class Eq7:
         return Terms(residual, slope)
 
     def _straightness(self, q: Float[ndarray, "m n 2"]) -> Terms:
-        """J_ST's: distances across the line nearest to its points.
-
-        The line through the mean runs along l, n is its normal, t and d are the parts of a point along and
-        across it. When the points move, l turns towards n by the sum of (d l + t n) . dq over the points,
-        divided by the gap; a distance then loses t times that.
-        """
-        points, present = self._on_lines(q), self._lines.present.astype(float)
-        line = fitted_lines(points, present)
-        normal = np.stack([-line.direction[:, 1], line.direction[:, 0]], axis=-1)
-        along, across = line.along * present, line.across * present
-        turn = (across[..., None] * line.direction[:, None] + along[..., None] * normal[:, None]) / line.gap[
-            :, None, None
-        ]
-        own = present[:, :, None] * (
-            np.eye(present.shape[1]) - present[:, None, :] / present.sum(1)[:, None, None]
-        )
-        return Terms(across, own[..., None] * normal[:, None, None] - along[:, :, None, None] * turn[:, None])
+        """J_ST's: distances across the line nearest to its points."""
+        return Terms(*distances(self._on_lines(q), self._lines.present))
 
     def _on_lines(self, q: Float[ndarray, "m n 2"]) -> Float[ndarray, "l w 2"]:
         return q[self._lines.row[:, None], self._lines.column]
@@ -208,8 +200,3 @@ def _fours(points: Float[ndarray, "l w 2"]) -> Float[ndarray, "l r 4 2"]:
     if points.shape[1] < 4:
         return np.empty((len(points), 0, 4, 2))
     return np.lib.stride_tricks.sliding_window_view(points, 4, axis=1).transpose(0, 1, 3, 2)
-
-
-def _runs(lines: SeenLines) -> ndarray:
-    """Which four consecutive seen corners of a line are neighbours on the target, (l, r)."""
-    return lines.present[:, 3:] & (lines.place[:, 3:] - lines.place[:, :-3] == 3)

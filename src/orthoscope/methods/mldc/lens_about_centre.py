@@ -33,18 +33,20 @@ import numpy as np
 from orthoscope.fitting.lens_fit import Pairs, fit_pairs
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Formula
+from orthoscope.models.lens import Formula, Lens
 from orthoscope.models.lenses import Fet, Pfet, parse_lens
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import Options, Solution
+from orthoscope.solve.least_squares import Options, Solution, solve
 from orthoscope.solve.losses import Loss
 
 __all__ = [
     "CENTRE",
+    "GAUGE",
     "fit_centred_lens",
     "paired_parameters",
     "parse_centred_lens",
     "polynomial_of_radii",
+    "refit_centred_lens",
     "straightened_parameters",
 ]
 
@@ -59,10 +61,10 @@ OFF_CENTRE = (
     "tau_x",
     "tau_y",
 )  # what a centre of its own stands for, but for small print
-SCALE: dict[type[Formula], str] = {
-    Pfet: "a1",
-    Fet: "scale",
-}  # the coefficient that scales the photograph; the others have none
+# The coefficient that scales the photograph; the others have none.
+SCALE: dict[type[Formula], str] = {Pfet: "a1", Fet: "scale"}
+# The coefficient that does what a stretched straight image does, so that one of both is held.
+GAUGE: dict[type[Lens], str] = {Pfet: "a1", Fet: "l"}
 
 
 def parse_centred_lens(text: str) -> tuple[type[Formula], tuple[str, ...]]:
@@ -124,6 +126,29 @@ def fit_centred_lens(
     )
     problem = Pairs(rays, pixels, free, columns=partial(_columns, K=K), moved=partial(_moved, K=K))
     return fit_pairs(problem, [replace(camera, lens=lens) for lens in lenses], loss=loss, options=options)
+
+
+def refit_centred_lens(
+    rays: Float[ndarray, "n 3"],
+    pixels: Float[ndarray, "n 2"],
+    *,
+    start: Camera,
+    free: Sequence[str],
+    loss: Loss | None = None,
+    options: Options | None = None,
+) -> Solution[Camera]:
+    """The same from a camera that is near already, over the parameters that are named.
+
+    Args:
+        rays, pixels: pairs, rays of any length.
+        start: a camera with a lens frame; its K says where rays are seen straight.
+        free: coefficients, the centre, `stretch`.
+        loss: how large errors count.
+        options: of the solver.
+    """
+    K = start.intrinsics
+    problem = Pairs(rays, pixels, free, columns=partial(_columns, K=K), moved=partial(_moved, K=K))
+    return solve(problem, start, loss=loss, options=options)
 
 
 def polynomial_of_radii(

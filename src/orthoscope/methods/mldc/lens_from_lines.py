@@ -11,8 +11,9 @@ lens's own camera has the lens frame for its K: cx and cy are the distortion cen
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +21,9 @@ from orthoscope.fitting.initial_camera import FIELDS
 from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, straightened_parameters
-from orthoscope.methods.mldc.line_residuals import LinesOfSight, Straightness
+from orthoscope.methods.mldc.line_residuals import Straightness
 from orthoscope.methods.mldc.lines_in_views import SeenLines
+from orthoscope.methods.mldc.straightened_lines import StraightenedLines
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.charts import EQUIDISTANT
 from orthoscope.models.lens import Formula
@@ -30,7 +32,7 @@ from orthoscope.solve.least_squares import Options, Solution, shared_covariance,
 from orthoscope.solve.losses import Cauchy, Linear, Loss
 from orthoscope.targets.target import Target
 
-__all__ = ["StraightLens", "fit_straight_lens"]
+__all__ = ["MEASURES", "StraightLens", "fit_straight_lens"]
 
 TRIED = 3  # starts that are followed to their end
 FORGIVING = 0.002  # of the longer side: errors beyond this hardly count in the first fit
@@ -47,6 +49,14 @@ OWN_NAMES = {
 }  # parameters of the lens frame, as those of the lens's own camera
 
 
+Lines = Any  # Straightness or StraightenedLines, each with unknowns of its own that have a `camera`
+# Where the distance of a corner from its line is measured.
+MEASURES: dict[str, Callable[[Observations, SeenLines, tuple[str, ...]], Lines]] = {
+    "photograph": Straightness,
+    "straight-image": StraightenedLines,
+}
+
+
 class StraightLens(NamedTuple):
     """What straightness tells: the lens's own camera, the parameters that were free (as lens_about_centre.py
     names them), their covariance.
@@ -56,7 +66,7 @@ class StraightLens(NamedTuple):
     free: tuple[str, ...]
     covariance: Float[ndarray, "k k"]
     assumptions: tuple[str, ...]
-    solution: Solution[LinesOfSight]
+    solution: Solution[Any]
 
     def moved(self, step: Float[ndarray, " k"]) -> Camera:
         """The lens's own camera after a step of the free parameters."""
@@ -70,19 +80,20 @@ def fit_straight_lens(
     lens: type[Formula],
     coefficients: tuple[str, ...],
     *,
+    measure: str,
     loss: Loss,
     options: Options,
 ) -> StraightLens:
-    """The lens, about a centre of its own, that makes the lines straightest, by least squares in pixels of
-    the photograph.
+    """The lens, about a centre of its own, that makes the lines straightest, by least squares.
 
-    Raises CalibrationError where the lines say too little for so many coefficients, or the lens cannot see
+    measure: of MEASURES, where distances are measured. Raises CalibrationError where the lines say too little
+        for so many coefficients, or the lens cannot see
     the corners.
     """
     lines = SeenLines.of(observations, target)
 
-    def problem(free: tuple[str, ...]) -> Straightness:
-        return Straightness(observations, lines, tuple(OWN_NAMES.get(name, name) for name in free))
+    def problem(free: tuple[str, ...]) -> Lines:
+        return MEASURES[measure](observations, lines, tuple(OWN_NAMES.get(name, name) for name in free))
 
     free = straightened_parameters(lens, coefficients)
     shape = tuple(name for name in free if name not in CENTRE)
@@ -92,6 +103,12 @@ def fit_straight_lens(
         free,
         _best([_followed(problem(free), problem(shape), start, loss, options) for start in starts]),
     )
+    if measure == "straight-image" and problem(free).shrinks(straight.solution.unknowns):
+        raise CalibrationError(
+            "the lens that makes the lines straightest in the straightened image shrinks that image to a"
+            " point, which"
+            " shortens all distances. Measure in the photograph: --set measure=photograph."
+        )
     if not _tells_centre(straight, problem(free)):
         free, told = (
             shape,
@@ -108,13 +125,13 @@ def fit_straight_lens(
     )
 
 
-def _result(problem: Straightness, free: tuple[str, ...], found: Solution[LinesOfSight]) -> StraightLens:
+def _result(problem: Lines, free: tuple[str, ...], found: Solution[Any]) -> StraightLens:
     return StraightLens(
         found.unknowns.camera, free, shared_covariance(found.sums, problem.measurements), (), found
     )
 
 
-def _with_scale(straight: StraightLens, problem: Straightness, loss: Loss, options: Options) -> StraightLens:
+def _with_scale(straight: StraightLens, problem: Lines, loss: Loss, options: Options) -> StraightLens:
     """The same with the frame's scale free too, where that makes the lines straighter."""
     tried = solve(
         problem,
@@ -128,9 +145,7 @@ def _with_scale(straight: StraightLens, problem: Straightness, loss: Loss, optio
     return _result(problem, (*straight.free, SCALE), found)._replace(assumptions=straight.assumptions)
 
 
-def _followed(
-    problem: Straightness, held: Straightness, start: Camera, loss: Loss, options: Options
-) -> Solution[LinesOfSight]:
+def _followed(problem: Lines, held: Lines, start: Camera, loss: Loss, options: Options) -> Solution[Any]:
     """Coefficients first, with the centre held, then all."""
     forgiving, rough = Cauchy(FORGIVING * max(start.image_size)), Options(max_steps=30, tolerance=1e-4)
     return solve(
@@ -141,13 +156,13 @@ def _followed(
     )
 
 
-def _best(solutions: list[Solution[LinesOfSight]]) -> Solution[LinesOfSight]:
+def _best(solutions: list[Solution[Any]]) -> Solution[Any]:
     """The likeliest start's, unless another's cost is really lower."""
     least = min(solution.cost for solution in solutions)
     return next(solution for solution in solutions if solution.cost <= (1.0 + EQUAL) * least)
 
 
-def _likeliest(problem: Straightness, image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
+def _likeliest(problem: Lines, image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
     """The starts under which the lines are least bent as they are, the best first; raises CalibrationError as
     `fit_straight_lens` does.
     """
@@ -179,7 +194,7 @@ def _starts(image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
     ]
 
 
-def _check_enough(problem: Straightness) -> None:
+def _check_enough(problem: Lines) -> None:
     """Raises CalibrationError where each line could be met by bending the lens."""
     said, unknowns = problem.measurements - 2 * problem.lines, len(problem.free)
     if said < unknowns:
@@ -190,7 +205,7 @@ def _check_enough(problem: Straightness) -> None:
         )
 
 
-def _tells_centre(straight: StraightLens, problem: Straightness) -> bool:
+def _tells_centre(straight: StraightLens, problem: Lines) -> bool:
     """Whether the centre, if it was free, is in the image and certain enough."""
     at = [straight.free.index(name) for name in CENTRE if name in straight.free]
     (width, height), K = straight.camera.image_size, straight.camera.intrinsics

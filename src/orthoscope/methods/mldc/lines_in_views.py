@@ -23,13 +23,11 @@ class SeenLines(NamedTuple):
     """Lines with at least FEWEST seen corners, padded to one length.
 
     row: (l,) of the observations' table. column: (l, w) of the table, its corners in the target's order.
-    place: (l, w) where each stands on the target's own line, so that neighbours differ by 1. present: (l, w);
-    padding comes last, its column is 0.
+    present: (l, w); padding comes last, its column is 0.
     """
 
     row: Int[ndarray, " l"]
     column: Int[ndarray, "l w"]
-    place: Int[ndarray, "l w"]
     present: Bool[ndarray, "l w"]
 
     @classmethod
@@ -52,8 +50,8 @@ class SeenLines(NamedTuple):
         place = np.argsort(column < 0, axis=-1, kind="stable")  # the seen ones first, in their order
         column = np.take_along_axis(column, place, axis=-1)
         width = int((column >= 0).sum(-1).max())
-        column, place = column[:, :width], place[:, :width]
-        return cls(row, np.maximum(column, 0), place, column >= 0)
+        column = column[:, :width]
+        return cls(row, np.maximum(column, 0), column >= 0)
 
 
 def _padded(lines: tuple[ndarray, ...], filling: int) -> Int[ndarray, "lines places"]:

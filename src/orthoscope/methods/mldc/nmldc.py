@@ -31,7 +31,7 @@ from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndar
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
-from orthoscope.methods.mldc.lens_from_lines import StraightLens, fit_straight_lens
+from orthoscope.methods.mldc.lens_from_lines import MEASURES, StraightLens, fit_straight_lens
 from orthoscope.models.camera import WIDEST, Camera
 from orthoscope.models.lenses import lens_name
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance
@@ -53,6 +53,7 @@ def nmldc(
     detections: Detections,
     *,
     lens: str = "pfet",
+    measure: str = "photograph",
     skew: bool = False,
     loss: str = "linear",
     loss_scale: float = 1.0,
@@ -62,13 +63,27 @@ def nmldc(
     """Calibrate the lens by straight lines alone, then the pin-hole on the straightened corners (the paper's
     NMLDC).
 
-    lens: a name of LENSES, or with the coefficients to free, `pfet:a3,a5`; `auto` is pfet. Radial
-    coefficients are free, since the lens has a centre of its own. skew: whether K has one. loss, loss_scale:
-    a name of LOSSES and where it starts to matter, pixels. progress: called after each step with (step,
-    cost), the lens's first. One photograph is enough, with the pin-hole's assumptions of few views. The
-    uncertainty of K has that of the lens in it. Raises CalibrationError where the lines or the views cannot
-    tell the camera, InputError for a setting that is none.
+    One photograph is enough, with the pin-hole's assumptions of few views. The uncertainty of K has that of
+    the lens in it.
+
+    Args:
+        detections: of a target with rows and columns.
+        lens: a name of LENSES, or with the coefficients to free, `pfet:a3,a5`; `auto` is pfet. Radial
+            coefficients are free, since the lens has a centre of its own.
+        measure: `photograph`, the distance of a corner from the image of its line; or `straight-image`, its
+            distance there from the line through its row, as the idea is commonly read
+            (straightened_lines.py), far more sensitive to noise.
+        skew: whether K has one.
+        loss: how large errors count, a name of LOSSES.
+        loss_scale: where the loss starts to matter, pixels.
+        max_steps: of each search.
+        progress: called after each step with (step, cost), the lens's first.
+    Raises:
+        CalibrationError: the lines or the views cannot tell the camera.
+        InputError: a setting is none.
     """
+    if measure not in MEASURES:
+        raise InputError(f"measure is {measure!r}; expected one of {', '.join(MEASURES)}.")
     if loss not in LOSSES:
         raise InputError(f"loss {loss!r} is not known; expected one of {', '.join(LOSSES)}.")
     used = with_usable_views(detections)
@@ -81,6 +96,7 @@ def nmldc(
         used.image_size,
         kind,
         coefficients,
+        measure=measure,
         loss=weighing,
         options=roughly,
     )  # 1
@@ -99,7 +115,14 @@ def nmldc(
         camera_from_target=poses,
         detections=seen,
         method="nmldc",
-        settings={"lens": lens, "skew": skew, "loss": loss, "loss_scale": loss_scale, "max_steps": max_steps},
+        settings={
+            "lens": lens,
+            "measure": measure,
+            "skew": skew,
+            "loss": loss,
+            "loss_scale": loss_scale,
+            "max_steps": max_steps,
+        },
         uncertainty=uncertainty,
         status=next(
             (s.status for s in (bent.solution, pinhole) if s.status is not Status.CONVERGED), Status.CONVERGED

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.report.data.rounded import PLACE, RESIDUAL, whole
 
-__all__ = ["trust"]
+__all__ = ["trust", "without_each"]
 
 
 def trust(evaluation: Evaluation) -> dict[str, Any] | str:
     """The map at infinity and at the target's distance, thousandths of a pixel at the centres of cells, and
     the region as a polygon, tenths of a pixel.
     """
-    error = getattr(evaluation, "error", None)
+    error = evaluation.error
     if error is None:
         return "How far off the camera is could not be predicted from these photographs."
     rows, columns = error.far.shape
@@ -27,3 +29,10 @@ def trust(evaluation: Evaluation) -> dict[str, Any] | str:
         "distance": float(f"{error.distance:.3g}"),
         "region": whole(error.region.ravel(), PLACE),
     }
+
+
+def without_each(evaluation: Evaluation) -> dict[str, Any] | str:
+    """By how much the image moves without each photograph, pixels."""
+    if evaluation.error is None or not np.isfinite(evaluation.error.without_px).any():
+        return "Too few photographs to leave one out."
+    return {"px": [round(px, 5) if np.isfinite(px) else None for px in evaluation.error.without_px.tolist()]}

@@ -16,6 +16,7 @@ const FIGURES = {
   trust,
   comparison,
   "by-view": byView,
+  "without-each": withoutEach,
   vectors,
   "by-place": byPlace,
   poses,

@@ -18,31 +18,42 @@ const quantile = (values, q) => {
   return s.length ? s[Math.min(s.length - 1, Math.floor(q * s.length))] : 0;
 };
 
+/* one place along the axis for each photograph */
+const alongViews = (top, label) => ({
+  range: () => ({ x: [-0.6, Math.max(views.length, 4) - 0.4], y: [top, 0] }),
+  labels: ["photograph", label],
+  gridY: true,
+  zoomsX: true,
+  margin: { l: 66, r: 14, t: 30, b: 42 },
+  height: () => 210,
+  ticksX: p => {
+    const [from, to] = p.shown.x,
+      room = p.box.w / (to - from),
+      names = room > 92,
+      by = names ? 1 : Math.max(1, Math.ceil(34 / room)),
+      named = name => (name.length > 14 ? "…" + name.slice(-13) : name),
+      told = [];
+    for (let i = Math.max(0, Math.ceil(from)); i <= to && i < views.length; i++)
+      if (i % by === 0) told.push({ at: i, text: names ? named(views[i].name) : `${i + 1}` });
+    return told;
+  },
+});
+const viewAt = (p, x, y) => {
+  const i = Math.round(p.atX(x)),
+    within = y > p.box.y && y < p.box.y + p.box.h + 20;
+  return within && i >= 0 && i < views.length && Math.abs(p.atX(x) - i) < 0.5 ? i : null;
+};
+const faded = i => (state.off.has(i) ? 0.25 : state.picked == null || state.picked === i ? 1 : 0.45);
+
 function byView() {
   const top = Math.max(...views.map(v => Math.max(v.rms || 0, v.heldOut || 0)), 1e-9) * 1.06;
-  const named = i => (views[i].name.length > 14 ? "…" + views[i].name.slice(-13) : views[i].name);
   new Plot("by-view", {
-    range: () => ({ x: [-0.6, Math.max(views.length, 4) - 0.4], y: [top, 0] }),
-    labels: ["photograph", "rms (px per point)"],
-    gridY: true,
-    zoomsX: true,
-    margin: { l: 56, r: 14, t: 30, b: 42 },
-    height: () => 210,
-    ticksX: p => {
-      const [from, to] = p.shown.x,
-        room = p.box.w / (to - from),
-        names = room > 92,
-        told = [];
-      const by = names ? 1 : Math.max(1, Math.ceil(34 / room));
-      for (let i = Math.max(0, Math.ceil(from)); i <= to && i < views.length; i++)
-        if (i % by === 0) told.push({ at: i, text: names ? named(i) : `${i + 1}` });
-      return told;
-    },
+    ...alongViews(top, "rms (px per point)"),
     paint: p => {
       const g = p.ctx,
         wide = Math.max(1, 0.72 * (p.X(1) - p.X(0)));
       views.forEach((v, i) => {
-        g.globalAlpha = state.off.has(i) ? 0.25 : state.picked == null || state.picked === i ? 1 : 0.45;
+        g.globalAlpha = faded(i);
         g.fillStyle = css(v.suspect ? "--red" : "--blue");
         if (v.rms != null) g.fillRect(p.X(i) - wide / 2, p.Y(v.rms), wide, p.Y(0) - p.Y(v.rms));
         if (v.heldOut != null) {
@@ -92,14 +103,31 @@ function byView() {
         );
     },
     find: (p, x, y) => {
-      const i = Math.round(p.atX(x));
-      return i >= 0 &&
-        i < views.length &&
-        Math.abs(p.atX(x) - i) < 0.5 &&
-        y > p.box.y &&
-        y < p.box.y + p.box.h + 20
-        ? { view: i, text: tellView(i) }
-        : null;
+      const i = viewAt(p, x, y);
+      return i == null ? null : { view: i, text: tellView(i) };
+    },
+  });
+}
+function withoutEach() {
+  const moves = panels["without-each"].px;
+  new Plot("without-each", {
+    ...alongViews(Math.max(...moves.map(v => v || 0), 1e-9) * 1.06, "image moves (px)"),
+    paint: p => {
+      const g = p.ctx,
+        wide = Math.max(1, 0.72 * (p.X(1) - p.X(0)));
+      moves.forEach((v, i) => {
+        g.globalAlpha = faded(i);
+        g.fillStyle = css("--green");
+        if (v != null) g.fillRect(p.X(i) - wide / 2, p.Y(v), wide, p.Y(0) - p.Y(v));
+      });
+      g.globalAlpha = 1;
+    },
+    find: (p, x, y) => {
+      const i = viewAt(p, x, y);
+      if (i == null) return null;
+      const told =
+        moves[i] == null ? "the others cannot tell the camera" : `the image moves by ${px(moves[i])}`;
+      return { view: i, text: `without ${i + 1} ${views[i].name}: ${told}` };
     },
   });
 }
