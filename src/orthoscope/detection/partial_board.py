@@ -25,6 +25,9 @@ from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 __all__ = ["Grid", "alternating", "filled", "grid_of", "laid_out", "placements"]
 
 FARTHEST_STRAY = 0.3  # of a step, from the parabolas of a corner's row and column
+CLEARINGS = 12  # times that strays are taken out, those nearly as far off as the worst together
+NEARLY_WORST = 0.8  # of the worst stray
+LEAST_LEFT = 0.5  # of the corners, after that: with fewer it was a lattice by chance
 LEAST_CONTRAST = 0.3  # of the usual strength of a corner
 LINE_GOES_ON = 0.6  # of the corners of a line that are in the picture
 LINE_ENDS = 0.75  # of its squares: they alternate, and behind the black ones is white
@@ -141,14 +144,13 @@ def _foreseen(grid: ndarray, turn: int) -> list[ndarray]:
 def _without_strays(found: CornerLattice) -> CornerLattice | None:
     """The lattice without corners that are off their neighbours' lines, the worst first."""
     pixels, cells, bright = found
-    for _ in range(len(pixels)):
-        if len(pixels) < 4:
+    for _ in range(CLEARINGS):
+        if len(pixels) < max(4, LEAST_LEFT * len(found.pixels)):
             return None
         stray = grid_shape(pixels, cells.astype(float)).stray
-        worst = int(stray.argmax())
-        if stray[worst] <= FARTHEST_STRAY:
+        if stray.max() <= FARTHEST_STRAY:
             break
-        keep = np.arange(len(pixels)) != worst
+        keep = stray <= max(FARTHEST_STRAY, NEARLY_WORST * stray.max())
         pixels, cells, bright = pixels[keep], cells[keep], bright[keep]
     cells = cells - cells.min(0)
     return CornerLattice(pixels, cells, bright)

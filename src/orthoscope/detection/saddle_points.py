@@ -29,7 +29,7 @@ AROUND = 32  # places on the circle
 LEAST_EVEN = 0.5  # of `even`
 LEAST_SHARE = 0.02  # of the strongest saddle's strength: weaker ones are not looked at
 LEAST_CONTRAST = 2.5  # grey levels, rms along the circle
-MOST = 4000  # saddles that are looked at, the strongest first
+MOST = 2500  # saddles that are looked at, the strongest first
 
 
 class SaddlePoints(NamedTuple):
