@@ -100,7 +100,7 @@ def test_the_same_twice_gives_the_same_but_for_the_seconds(run, calibrated, tmp_
     [
         (("--with", "magic"), "magic"),
         (("--with", "fccm:brown:k9"), "k9"),
-        (("--with", "fccm:shape=flat"), "target"),
+        (("--with", "fccm:shape=flat"), "shape"),
         (("--with", "fccm:free"), "free"),
         (("--folds", "1"), "folds"),
     ],

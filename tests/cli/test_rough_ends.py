@@ -149,4 +149,4 @@ def test_without_opencv_one_is_told_what_to_install(run, monkeypatch):
     monkeypatch.setattr(sys.modules["orthoscope.cli.export"], "tool_lines", fail)
     told = run("tools")
     assert told.code == 2
-    assert "pip install opencv-python-headless" in told.err
+    assert "pip install 'orthoscope[opencv]'" in told.err

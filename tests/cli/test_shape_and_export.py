@@ -59,7 +59,7 @@ def test_a_shape_that_is_none_is_refused(calibrate):
 def test_a_method_that_takes_the_target_as_flat_refuses_a_shape(calibrate):
     told, _ = calibrate("--shape", "free", "--method", "fccm")
     assert told.code == 2
-    assert "method 'fccm' has no setting 'target'" in told.err
+    assert "method 'fccm' has no setting 'shape'" in told.err
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import subprocess
 import sys
@@ -93,9 +94,13 @@ def test_calibrating_and_judging_see_one_thread(monkeypatch):
     )
     seen = []
     fccm = METHODS["fccm"]
-    monkeypatch.setitem(
-        METHODS.data, "fccm", lambda *a, **k: (seen.append(threads_of_blas()), fccm(*a, **k))[1]
-    )
+
+    @functools.wraps(fccm)
+    def looking(*args, **settings):
+        seen.append(threads_of_blas())
+        return fccm(*args, **settings)
+
+    monkeypatch.setitem(METHODS.data, "fccm", looking)
     evaluate(calibrate(detections, method="fccm"), folds=2)
     assert seen == [{1}] * 3
     assert threads_of_blas() == {2}

@@ -68,7 +68,7 @@ def test_an_entrant_is_a_method_its_lens_and_its_settings(text, method, settings
         ("", ("''", "fccm:brown")),
         ("fccm:fisheye", ("'fisheye'", "kannala_brandt")),
         ("fccm:brown:k9", ("'k9'", "k1, k2")),
-        ("fccm:shape=flat", ("'target'", "loss_scale")),
+        ("fccm:shape=flat", ("'shape'", "loss_scale")),
         ("fccm:skew=perhaps", ("'perhaps'", "skew=false")),
         ("fccm:max_steps=many", ("'many'", "a whole number", "max_steps=200")),
         ("fccm:loss_scale=wide", ("'wide'", "a number")),
