@@ -51,7 +51,7 @@ def taken_again(clean: Detections, rng: np.random.Generator) -> Detections:
 
 def fitted(detections: Detections, base: str, model: tuple[str, str]) -> Scatter:
     """A camera and how it scatters."""
-    known = linearised(fit_step_one(fit_flat(detections, lens=base), target=model[0], first_lens=model[1]))
+    known = linearised(fit_step_one(fit_flat(detections, lens=base), shape=model[0], first_lens=model[1]))
     return scatter_of(known, leave_one_out(known), detections.target.points)
 
 

@@ -30,8 +30,8 @@ def moved(camera: Camera, step: np.ndarray) -> Camera:
     return Parameters.of(NAMES).moved(camera, step)
 
 
-def scattered(detections: Detections, target: str = "flat", first_lens: str = "formula") -> Scatter:
-    known = linearised(fit_step_one(fit_flat(detections, lens="brown"), target=target, first_lens=first_lens))
+def scattered(detections: Detections, shape: str = "flat", first_lens: str = "formula") -> Scatter:
+    known = linearised(fit_step_one(fit_flat(detections, lens="brown"), shape=shape, first_lens=first_lens))
     return scatter_of(known, leave_one_out(known), detections.target.points)
 
 

@@ -27,8 +27,8 @@ CORNER = 15e-6  # metres: noise in the mean of 15 views, where a board of 0.2 m 
 SOME = Evidence(0.01, (1e-6, 4e-6), (1e-8, 4e-8, 1e-6), 1e-8, SIZE, parameters=40.0)
 
 
-def fitted(detections: Detections, *, target: str = "free", first_lens: str = FORMULA) -> StepOneFit:
-    return fit_step_one(fccm(detections, lens="brown"), target=target, first_lens=first_lens)
+def fitted(detections: Detections, *, shape: str = "free", first_lens: str = FORMULA) -> StepOneFit:
+    return fit_step_one(fccm(detections, lens="brown"), shape=shape, first_lens=first_lens)
 
 
 @pytest.mark.parametrize("first_lens", [FORMULA, FREE])

@@ -26,7 +26,7 @@ def photographs() -> Detections:
 
 
 def fitted(photographs: Detections, shape: str, first_lens: str) -> StepOneFit:
-    return fit_step_one(fccm(photographs, lens="brown"), target=shape, first_lens=first_lens)
+    return fit_step_one(fccm(photographs, lens="brown"), shape=shape, first_lens=first_lens)
 
 
 @pytest.fixture(scope="module", params=KINDS, ids="-".join)
