@@ -97,13 +97,13 @@ def test_the_models_own_part_is_the_scatter_over_repeated_photographs():
 
 def test_more_unknowns_make_no_deviation_smaller(noisy: Detections):
     least = None
-    for target, through in (
+    for shape, first_lens in (
         ("flat", "formula"),
         ("smooth", "formula"),
         ("free", "formula"),
         ("free", "free"),
     ):
-        scatter = scattered(noisy, target, through)
+        scatter = scattered(noisy, shape, first_lens)
         deviations = np.sqrt(np.diag(scatter.model)[: len(scatter.names)])
         if least is not None:
             assert (deviations > 0.98 * least).all()  # the noise that each finds differs by a percent

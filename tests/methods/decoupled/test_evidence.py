@@ -32,7 +32,7 @@ def fitted(detections: Detections, *, shape: str = "free", first_lens: str = FOR
 
 
 @pytest.mark.parametrize("first_lens", [FORMULA, FREE])
-def test_the_size_of_corners_displacements_is_found_within_sampling_error(through):
+def test_the_size_of_corners_displacements_is_found_within_sampling_error(first_lens):
     sigma, fits = np.array([3e-4, 2e-4, 6e-4]), []
     for seed in range(4):
         detections = photographed_with(
