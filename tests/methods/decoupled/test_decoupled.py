@@ -311,7 +311,10 @@ def test_views_that_cannot_tell_the_camera_are_refused_as_by_fccm():
         ({"lens": "free", "first_lens": "formula"}, "expected one of the two"),
         ({"formulas": ("brown", "soap")}, "lens 'soap' is not known"),
         ({"fit": "by eye"}, "fit is 'by eye'; expected 'joint'"),
-        ({"lens": "brown", "fit": "joint", "first_lens": "free"}, "cannot be fitted joint with first_lens free"),
+        (
+            {"lens": "brown", "fit": "joint", "first_lens": "free"},
+            "cannot be fitted joint with first_lens free",
+        ),
     ],
 )
 def test_a_setting_that_is_none_is_refused(noisy: Detections, settings: dict, message: str):
