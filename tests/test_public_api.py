@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 
 import orthoscope
 from helpers.scenes import NARROW, camera_with, photographed
+from orthoscope.methods import settings, settings_of
 from orthoscope.models.lenses import LENSES, Brown
 
 SOURCE = Path(orthoscope.__file__).parent
@@ -85,3 +86,9 @@ def test_matrix_and_distortion_are_a_line_each(calibration):
     assert distortion.shape == (5,)
     with pytest.raises(orthoscope.InputError, match="OpenCV has no"):
         camera_with(LENSES["fov"]()).opencv()
+
+
+@pytest.mark.parametrize("method", ["decoupled", "fccm", "mldc", "nmldc"])
+def test_editors_know_the_settings_that_a_method_has(method):
+    told = getattr(settings, f"{method.capitalize()}Settings")
+    assert list(told.__annotations__) == settings_of(method)

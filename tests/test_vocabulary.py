@@ -51,7 +51,7 @@ def names_with_two_meanings(package: Path) -> dict[str, list[str]]:
         for node in module.body:
             if isinstance(node, Definition) and node.name in public and not is_verb(path, node):
                 places[node.name].append(str(path))
-    return {name: where for name, where in places.items() if len(where) > 1}
+    return {name: where for name, where in places.items() if len(set(where)) > 1}  # overloads are one
 
 
 def definitions(module: ast.Module) -> Iterator[Definition]:

@@ -39,7 +39,7 @@ def test_every_method_says_its_name_and_can_be_called_again_from_its_settings():
     ("wrong", "message"),
     [
         ({"method": "magic"}, "method 'magic' is not known; expected one of decoupled, fccm"),
-        ({"lense": "brown"}, "method 'decoupled' has no setting 'lense'; it has lens, target"),
+        ({"lense": "brown"}, "method 'decoupled' has no setting 'lense'; it has lens, shape"),
     ],
 )
 def test_a_method_or_setting_that_is_none_is_refused(wrong, message):

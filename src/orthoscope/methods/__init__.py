@@ -11,12 +11,13 @@ import importlib.metadata
 import inspect
 from collections import UserDict
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, get_origin, get_type_hints
+from typing import Any, Literal, Unpack, get_origin, get_type_hints, overload
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.blas import with_one_thread
+from orthoscope.methods.settings import DecoupledSettings, FccmSettings, MldcSettings, NmldcSettings
 from orthoscope.targets.detections import Detections
 
 __all__ = ["METHODS", "calibrate", "check_settings", "settings_of"]
@@ -62,6 +63,24 @@ def _of_others() -> dict[str, str]:
 METHODS.data.update(_of_others())
 
 
+@overload
+def calibrate(
+    detections: Detections, *, method: Literal["decoupled"] = ..., **settings: Unpack[DecoupledSettings]
+) -> Calibration: ...
+@overload
+def calibrate(
+    detections: Detections, *, method: Literal["fccm"], **settings: Unpack[FccmSettings]
+) -> Calibration: ...
+@overload
+def calibrate(
+    detections: Detections, *, method: Literal["nmldc"], **settings: Unpack[NmldcSettings]
+) -> Calibration: ...
+@overload
+def calibrate(
+    detections: Detections, *, method: Literal["mldc"], **settings: Unpack[MldcSettings]
+) -> Calibration: ...
+@overload
+def calibrate(detections: Detections, *, method: str, **settings: Any) -> Calibration: ...
 @with_one_thread
 def calibrate(detections: Detections, *, method: str = "decoupled", **settings: Any) -> Calibration:
     """Calibrate a camera from detections by a method of METHODS; its settings are the method's own (lens,
