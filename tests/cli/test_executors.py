@@ -193,5 +193,5 @@ def test_verbs_give_the_same_files_on_a_cluster_as_here(run, dask, photos, calib
         sorted(path for path in (tmp_path / name).rglob("*") if path.is_file()) for name in ("here", "there")
     )
     assert [path.name for path in here] == [path.name for path in there]
-    assert len(here) == 13  # detections, evaluation, camera, ten pictures
+    assert len(here) == 14  # detections, evaluation, camera, ten pictures and their list
     assert all(a.read_bytes() == b.read_bytes() for a, b in zip(here, there, strict=True))

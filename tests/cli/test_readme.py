@@ -27,7 +27,7 @@ def beside_photos(photos, tmp_path, monkeypatch):
 def test_its_python_runs_and_leaves_what_it_says(beside_photos, capsys):
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     exec(compile(code, "README.md", "exec"), {})
-    assert "px on photographs that were not used" in capsys.readouterr().out
+    assert "off by about" in capsys.readouterr().out
     assert (beside_photos / "calibration.json").is_file()
 
 

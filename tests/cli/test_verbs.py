@@ -81,7 +81,7 @@ def test_the_same_command_twice_gives_the_same_bytes(run, photos, tmp_path):
     )
     assert [p.relative_to(tmp_path / "a") for p in first] == [p.relative_to(tmp_path / "b") for p in second]
     assert all(a.read_bytes() == b.read_bytes() for a, b in zip(first, second, strict=True))
-    assert len(first) == 4 + 10 + 1  # three files, ten straight pictures, their camera
+    assert len(first) == 4 + 10 + 2  # four files, ten straight pictures, their camera and their list
 
 
 @pytest.mark.slow
