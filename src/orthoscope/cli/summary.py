@@ -131,7 +131,7 @@ def _choice_lines(calibration: Calibration) -> list[str]:
             f"loses {other.loses_px:.3f} px" if other.loses_px > 0 else f"would gain {-other.loses_px:.3f} px"
         )
         lines.append(
-            f"choice     target {settings['target']}, lens {settings['lens']}, base {settings['base']}; next target"
+            f"choice     target {settings['shape']}, lens {settings['lens']}, base {settings['base']}; next target"
             f" {other.target}, lens {other.lens}, base {other.base} {how} held out"
         )
     return lines
