@@ -196,7 +196,7 @@ def test_what_no_view_could_judge_is_null_in_the_file(tmp_path):
     )
     assert content["candidates"][1:] == [
         {
-            "shape": "smooth",
+            "target": "smooth",
             "lens": "brown",
             "base": "brown",
             "fit": "joint",
@@ -206,7 +206,7 @@ def test_what_no_view_could_judge_is_null_in_the_file(tmp_path):
             "loses_px": 1 / 7,
         },
         {
-            "shape": "free",
+            "target": "free",
             "lens": "rational",
             "base": "brown",
             "fit": "pairs",

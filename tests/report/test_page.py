@@ -233,7 +233,7 @@ def test_the_page_says_the_verdict_the_suspects_the_assumptions_and_how_it_was_m
     for said in (
         "fccm",
         "converged: the step no longer changes the parameters",
-        "k1, k2, p1, p2, k3",
+        "brown",
         "0.1.0",
         "per point",
     ):
