@@ -183,7 +183,7 @@ def _by_opencv(grey: ndarray, board: Chessboard) -> Sight | None:
     """What OpenCV's finders see, if it is the whole board."""
     for rough in opencv_boards(grey, board.columns, board.rows):
         corners = rough.reshape(board.rows, board.columns, 2)
-        if cross(corners[0, -1] - corners[0, 0], corners[-1, 0] - corners[0, 0]) < 0:
+        if cross(corners[:1, -1] - corners[:1, 0], corners[-1:, 0] - corners[:1, 0])[0] < 0:
             corners = corners[:, ::-1]
         grid = grid_of(grey, corners, max(board.grid))
         sight = _on_board(grey, grid, board)
