@@ -200,7 +200,7 @@ def test_out_of_several_formulas_the_one_that_foresees_best_is_taken(noisy: Dete
         noisy, shape="free", first_lens="formula", formulas=("rational", "division:l", "brown")
     )
     assert chosen.settings["lens"] == "brown"  # simpler ones do not suffice, richer ones gain nothing
-    assert {(candidate.lens, candidate.fit) for candidate in chosen.candidates[-5:]} == {
+    assert {(candidate.lens, candidate.fit) for candidate in chosen.candidates} >= {
         ("division:l", "pairs"),
         ("division:l", "joint"),
         ("brown", "joint"),
