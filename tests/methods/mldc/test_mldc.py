@@ -242,7 +242,7 @@ def test_the_nce_of_fccm_in_the_papers_simulation_is_as_known(distortion, known)
 
 @pytest.mark.slow
 def test_the_table_of_docs_paper_md_is_what_this_code_finds():
-    text = (Path(__file__).parents[2] / "docs" / "paper.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "paper.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (low|high) \| (.+?) \| (.*?)\| (.+?) \| (.+?) \|$", text, re.MULTILINE)
     assert {name for distortion, name, *_ in rows if distortion == "low"} == set(EXPERIMENT)
     data = {distortion: papers_simulation(distortion) for distortion in ("low", "high")}
