@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orthoscope.evaluation.camera_error import CameraError, predicted_error, rms_difference, seen_places
+from orthoscope.evaluation.camera_error import CameraError, picked, predicted_error, rms_difference
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
@@ -64,16 +64,29 @@ def reference_fit(calibration: Calibration) -> ReferenceFit | None:
         own, without, within = _own(calibration, candidates, richest)
     except (CalibrationError, np.linalg.LinAlgError):
         return None
-    seen = seen_places(np.concatenate([view.pixels for view in detections.views]))
-    distance = float(np.median([np.linalg.norm(pose.translation) for pose in calibration.camera_from_target]))
+    pixels = np.concatenate([view.pixels for view in detections.views])
+    some = picked(pixels)
+    seen, distance = pixels[some], _distances(calibration)[some]
     error = predicted_error(
         own or of_richest, seen, distance=distance, richest=None if own is None else of_richest
     )
     apart = rms_difference(calibration.camera, (own or of_richest).camera, seen)
     if apart > AS_GOOD * error.seen_px:
         # Not the minimum of a fit whose scatter is known: what is apart is its bias.
-        error = replace(error, seen_px=float(np.hypot(error.seen_px, apart)), bias_px=apart)
+        error = replace(
+            error,
+            seen_px=float(np.hypot(error.seen_px, apart)),
+            near_seen_px=float(np.hypot(error.near_seen_px, apart)),
+            bias_px=apart,
+        )
     return ReferenceFit(known, left_out, richest.base, error, without, within)
+
+
+def _distances(calibration: Calibration) -> Float[ndarray, " n"]:
+    """Of every detected corner from the camera, metres, view after view."""
+    points = calibration.detections.target.points
+    pairs = zip(calibration.camera_from_target, calibration.detections.views, strict=True)
+    return np.concatenate([np.linalg.norm(pose.apply(points[view.ids]), axis=1) for pose, view in pairs])
 
 
 def _base(calibration: Calibration) -> str:
