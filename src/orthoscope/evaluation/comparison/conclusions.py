@@ -7,6 +7,7 @@ for.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isnan
 
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
 from orthoscope.geometry.numbers import with_error
@@ -33,7 +34,7 @@ def conclusions(comparison: Comparison) -> tuple[str, ...]:
         told.append(_as_good(as_good))
     if worse:
         told.append(f"The next, {worse[0].entry.name}, loses {_loss(worse[0])} px.")
-    learnt = min(judged, key=lambda standing: standing.rms_px)
+    learnt = min(judged, key=lambda standing: (isnan(standing.rms_px), standing.rms_px))
     if learnt in worse:
         told.append(
             f"{learnt.entry.name} has the least error on photographs that were used, {learnt.rms_px:.3f} px,"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
-from orthoscope.evaluation.comparison.entry import Entry
+from orthoscope.evaluation.comparison.entry import AS_IT_IS, Entry
 from orthoscope.formats.own.schema import CameraFile, DetectionsFile, TargetShapeFile
 from orthoscope.formats.own.struct import FileStruct, Number, array_of, null_for_nan, rows_of
 from orthoscope.geometry.arrays import InputError
@@ -53,10 +53,12 @@ class StandingFile(FileStruct, kw_only=True):
 
     def core(self) -> Standing:
         numbers = {name: getattr(self, name) for name in NUMBERS}
+        camera = self.camera and self.camera.core()
+        given = camera if self.method == AS_IT_IS else None
         return Standing(
-            Entry(self.name, self.method, self.settings),
+            Entry(self.name, self.method, self.settings, given),
             array_of(self.squares, -1),
-            camera=self.camera and self.camera.core(),
+            camera=camera,
             target_shape=self.target_shape and self.target_shape.core(),
             lens=self.lens,
             failure=self.failure,
