@@ -110,7 +110,7 @@ def calibrate_into(
     """The main job; prints the summary and returns the evaluation."""
     from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.judged import EVALUATION
+    from orthoscope.cli.judged import EVALUATION_NAME
     from orthoscope.cli.method_settings import settings_from
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines
@@ -146,7 +146,7 @@ def calibrate_into(
         calibration = run(detections, method=method, **given, **told)
     with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
         evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
-    for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION)):
+    for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION_NAME)):
         save(thing, out / name)
         written.append(out / name)
     if export:

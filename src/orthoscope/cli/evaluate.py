@@ -57,7 +57,7 @@ def evaluate(
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
     from orthoscope.cli.executors import threads
     from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.judged import EVALUATION, judged_calibration
+    from orthoscope.cli.judged import EVALUATION_NAME, judged_calibration
     from orthoscope.cli.on_others import json_of, lines_of, on_others
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines, to_json
@@ -67,7 +67,7 @@ def evaluate(
     from orthoscope.geometry.arrays import InputError
 
     path = Path(calibration)
-    if not others and (path.is_dir() or path.name == EVALUATION):
+    if not others and (path.is_dir() or path.name == EVALUATION_NAME):
         loaded = None
     else:
         loaded = load_source(calibration, image_size=image_size)

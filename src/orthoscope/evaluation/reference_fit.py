@@ -26,8 +26,10 @@ from orthoscope.models.lenses import FREE, lens_name
 
 __all__ = ["ReferenceFit", "reference_fit"]
 
-AS_GOOD = 0.2  # of the error: a camera that is nearer to a fit of which all is known is that fit's
-FEWEST_VIEWS = 2  # with fewer, a free lens and a free target have nothing to be told by
+# A camera that is nearer to a fit of which all is known than this share of the error is that fit's.
+AS_GOOD_SHARE = 0.2
+# With fewer views a free lens and a free target have nothing to be told by.
+FEWEST_VIEWS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ def reference_fit(calibration: Calibration) -> ReferenceFit | None:
         own or of_richest, seen, distance=distance, richest=None if own is None else of_richest
     )
     apart = rms_difference(calibration.camera, (own or of_richest).camera, seen)
-    if apart > AS_GOOD * error.seen_px:
+    if apart > AS_GOOD_SHARE * error.seen_px:
         # Not the minimum of a fit whose scatter is known: what is apart is its bias.
         error = replace(error, seen_px=float(np.hypot(error.seen_px, apart)), bias_px=apart)
     return ReferenceFit(known, left_out, richest.base, error, without, within)

@@ -44,7 +44,8 @@ __all__ = [
     "warnings",
 ]
 
-ANGLES = ("tau_x", "tau_y", "w")  # coefficients in radians; all others have no unit
+# These coefficients are in radians; all others have no unit.
+ANGLE_NAMES = ("tau_x", "tau_y", "w")
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,9 @@ def parameters(calibration: Calibration) -> list[Parameter]:
     unused = _unused(calibration)
     coefficients = zip(camera.lens.names(), camera.lens.coefficients.tolist(), strict=True)
     rows += [
-        (name, value, "rad" if name in ANGLES else "") for name, value in coefficients if name not in unused
+        (name, value, "rad" if name in ANGLE_NAMES else "")
+        for name, value in coefficients
+        if name not in unused
     ]
     deviations = calibration.uncertainty.deviations
     return [

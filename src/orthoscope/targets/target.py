@@ -17,7 +17,8 @@ from orthoscope.targets.drawing import Drawing
 
 __all__ = ["Target", "chessboard", "target_of"]
 
-FARTHEST_OFF = 1e-6  # of the board's size: points nearer to the drawn ones than this are where they are drawn
+# Points nearer to the drawn ones than this share of the board's size are where they are drawn.
+FARTHEST_OFF_SHARE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,7 @@ class Target:
             )
         printed = self.board.points()
         step = self.points[0] - printed[0]
-        if np.abs(self.points - printed - step).max() > FARTHEST_OFF * np.ptp(printed, axis=0).max():
+        if np.abs(self.points - printed - step).max() > FARTHEST_OFF_SHARE * np.ptp(printed, axis=0).max():
             raise InputError(
                 f"target {self.name!r} has points that are not where {self.board.description} has them, so it"
                 " cannot be drawn; expected a target as its description makes it."

@@ -1,7 +1,7 @@
 """What follows from a comparison, in plain words.
 
-A difference counts where it is more than SURELY times its standard error; what is less, chance may account
-for.
+A difference counts where it is more than SURE_ERRORS times its standard error; what is less, chance may
+account for.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from math import isnan
 
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
 from orthoscope.geometry.numbers import with_error
-from orthoscope.methods.decoupled.model_selection import SURELY
+from orthoscope.methods.decoupled.model_selection import SURE_ERRORS
 
 __all__ = ["as_good_as_best", "conclusions"]
 
@@ -48,7 +48,7 @@ def as_good_as_best(comparison: Comparison) -> tuple[Standing, ...]:
     return tuple(
         standing
         for standing in comparison.judged[1:]
-        if standing.loses_px <= SURELY * standing.loses_error_px
+        if standing.loses_px <= SURE_ERRORS * standing.loses_error_px
     )
 
 

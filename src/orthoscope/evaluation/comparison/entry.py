@@ -23,7 +23,8 @@ USUAL = (
     "decoupled:shape=flat",
     "fccm:rational",
 )  # fccm alone: brown, or kannala_brandt if wide
-CHOSEN = ("auto", "free")  # lenses that are in no table
+# These lenses are in no table.
+LENSES_IN_NO_TABLE = ("auto", "free")
 TRUTHS = {"true": True, "yes": True, "false": False, "no": False}
 
 
@@ -70,7 +71,7 @@ def parse_entry(text: str) -> Entry:
             " fccm:brown."
         )
     lens = ":".join(part for part in parts if "=" not in part)
-    if lens and lens not in CHOSEN:
+    if lens and lens not in LENSES_IN_NO_TABLE:
         parse_lens(lens)
     settings: dict[str, Any] = {"lens": lens} if lens else {}
     known = _settings_of(method)

@@ -48,11 +48,11 @@ class StandingFile(FileStruct, kw_only=True):
             squares=rows_of(standing.squares),
             camera=CameraFile.of(standing.camera) if standing.camera else None,
             target_shape=TargetShapeFile.of(shape) if shape else None,
-            **{name: null_for_nan(getattr(standing, name)) for name in NUMBERS},
+            **{name: null_for_nan(getattr(standing, name)) for name in NUMBER_FIELDS},
         )
 
     def core(self) -> Standing:
-        numbers = {name: getattr(self, name) for name in NUMBERS}
+        numbers = {name: getattr(self, name) for name in NUMBER_FIELDS}
         camera = self.camera and self.camera.core()
         given = camera if self.method == AS_IT_IS else None
         return Standing(
@@ -92,4 +92,5 @@ class ComparisonFile(FileStruct, kw_only=True):
         return Comparison(self.detections.core(), self.folds, standings)
 
 
-NUMBERS = tuple(name for name, kind in StandingFile.__annotations__.items() if kind == "Number")
+# These fields are one number each.
+NUMBER_FIELDS = tuple(name for name, kind in StandingFile.__annotations__.items() if kind == "Number")

@@ -19,7 +19,7 @@ from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.scatter import Scatter, scatter_of
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
-from orthoscope.methods.decoupled.model_selection import NOTHING, Contender
+from orthoscope.methods.decoupled.model_selection import NEGLIGIBLE_SQUARE, Contender
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.decoupled.step_two import formula_from_pairs
@@ -107,7 +107,7 @@ class Candidates:
             return self.from_pairs(model).squares
         fit = self.linearised(model)
         # Without noise nothing holds back what one view alone decides, and nothing has to: it is exact.
-        return (fit.errors**2).sum(1) if fit.noise < NOTHING else self.left_out(model).squares
+        return (fit.errors**2).sum(1) if fit.noise < NEGLIGIBLE_SQUARE else self.left_out(model).squares
 
     def _flat(self, base: str) -> Calibration:
         return fit_flat(self.detections, lens=base, skew=self._skew)
