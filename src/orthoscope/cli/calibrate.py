@@ -39,7 +39,7 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @options.skew
 @options.loss
 @options.image_size
-@options.folds
+@options.own_folds
 @click.option(
     "--without",
     multiple=True,
@@ -95,7 +95,7 @@ def calibrate_into(
     skew: bool = False,
     loss: str | None = None,
     image_size: tuple[int, int] | None = None,
-    folds: int = 5,
+    folds: int | None = None,
     without: tuple[str, ...] = (),
     more: tuple[str, ...] = (),
     jobs: int | None = None,

@@ -38,7 +38,7 @@ with --target they show that one, taken as it is said to be.
 )
 @options.target
 @options.image_size
-@options.folds_anew
+@options.own_folds
 @options.jobs
 @options.cluster
 @options.verbose

@@ -56,6 +56,5 @@ def _made(
     from orthoscope.cli.progress import bar
     from orthoscope.evaluation.evaluate import evaluate
 
-    asked = {"folds": folds} if folds else {}
-    with processes(jobs or 1, cluster) as executor, bar("holding out") as progress:
-        return evaluate(calibration, executor=executor, progress=progress, **asked)
+    with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
+        return evaluate(calibration, folds=folds, executor=executor, progress=progress)

@@ -79,8 +79,12 @@ def _details(evaluation: Evaluation) -> list[str]:
     )
     if not math.isnan(evaluation.held_out_rms_px):
         lines.append(
-            f"held out   {with_error(evaluation.held_out_rms_px, evaluation.held_out_error_px)} px per point, on"
-            " views that were not used"
+            f"held out   {with_error(evaluation.held_out_rms_px, evaluation.held_out_error_px)} px per point, "
+            + (
+                "each photograph left out in its turn"
+                if not evaluation.folds
+                else f"in {evaluation.folds} folds"
+            )
         )
     lines.append(f"NCE        {evaluation.nce:.3f} (1 is what rounding to whole pixels would give)")
     lines.append(f"misfit     {_misfit_line(evaluation.misfit.target.test, evaluation.misfit.lens.test)}")

@@ -14,7 +14,7 @@ from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
-__all__ = ["held_out_nce", "lateral_errors", "normalised_calibration_error"]
+__all__ = ["held_out_nce", "lateral_errors", "nce_of", "normalised_calibration_error"]
 
 
 def normalised_calibration_error(
@@ -76,6 +76,23 @@ def lateral_errors(
     )
     rays, observed = rays[usable], observed[usable]
     return rays * (observed[:, 2] / rays[:, 2])[:, None], observed
+
+
+def nce_of(
+    camera: Camera,
+    camera_from_target: Sequence[Pose],
+    detections: Detections,
+    *,
+    shape: TargetShape | None = None,
+) -> float:
+    """NCE of a camera at these poses; NaN where no straight image would hold any corner.
+
+    Arguments as in `lateral_errors`.
+    """
+    estimated, observed = lateral_errors(camera, camera_from_target, detections, shape=shape)
+    if not len(observed):
+        return float("nan")
+    return normalised_calibration_error(estimated, observed, camera.intrinsics)
 
 
 def held_out_nce(unseen: HeldOut, detections: Detections) -> float:

@@ -262,4 +262,5 @@ def _calibration(
         candidates=told,
         free_camera=fit.estimate.camera if model.first_lens == FREE and model.formula else None,
         variances=fit.evidence.variances,
+        kept=candidates,
     )
