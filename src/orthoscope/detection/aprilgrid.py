@@ -41,8 +41,9 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
     """
     count = board.columns * board.rows
     found = find_markers(grey, DICTIONARY, int(ENOUGH * count), border=BORDER)
-    known = found.numbers < count
-    markers = Markers(found.numbers[known], found.corners[known])
+    numbers = found.numbers - board.first
+    known = (numbers >= 0) & (numbers < count)
+    markers = Markers(numbers[known], found.corners[known])
     ids, corners = _of_board(markers, board)
     inside = ((corners >= RIM) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM)).all(1)
     ids, corners = ids[inside], corners[inside]
