@@ -208,7 +208,7 @@ def _write_straight(
             " with the photographs."
         )
     calibration = evaluation.calibration
-    paths = [files[view.image] for view in calibration.detections.views]
+    paths = list(dict.fromkeys(files[view.image] for view in calibration.detections.views))
     view = straight_camera(calibration.camera, keep=keep)
     written, _ = straighten(
         paths, calibration.camera, out / "undistorted", view=view, jobs=jobs, cluster=cluster

@@ -47,9 +47,10 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
         board: what to look for.
     """
     count = board.columns * board.rows
-    found = find_markers(grey, DICTIONARY, int(ENOUGH_TAGS_SHARE * count), border=BORDER_SQUARES)
-    known = found.numbers < count
-    markers = Markers(found.numbers[known], found.corners[known])
+    found = find_markers(grey, DICTIONARY, int(ENOUGH * count), border=BORDER)
+    numbers = found.numbers - board.first
+    known = (numbers >= 0) & (numbers < count)
+    markers = Markers(numbers[known], found.corners[known])
     ids, corners = _of_board(markers, board)
     inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(1)
     ids, corners = ids[inside], corners[inside]

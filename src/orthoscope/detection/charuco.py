@@ -62,10 +62,11 @@ def _in_layout(found: Markers, board: Charuco) -> tuple[Markers, bool]:
     said.
     """
     best = Markers(found.numbers[:0], found.corners[:0]), board.legacy
+    numbers = found.numbers - board.first
     for legacy in (board.legacy, not board.legacy):
         plane = board.marker_corners(legacy=legacy)
-        known = found.numbers < len(plane)
-        markers = Markers(found.numbers[known], found.corners[known])
+        known = (numbers >= 0) & (numbers < len(plane))
+        markers = Markers(numbers[known], found.corners[known])
         mine = of_one_board(markers, plane[markers.numbers])
         if mine.sum() > len(best[0].numbers):
             best = Markers(markers.numbers[mine], markers.corners[mine]), legacy

@@ -12,7 +12,7 @@ levels. Grey is linear in light.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -90,15 +90,29 @@ class Renderer:
         Raises:
             InputError: the target cannot be drawn.
         """
-        sheet = Sheet(target.drawing(), black=BLACK_LEVEL, white=WHITE_LEVEL)
+        return self.photograph_of([(target, camera_from_target)], rng=rng)
+
+    def photograph_of(
+        self, stands: Sequence[tuple[Target, Pose]], *, rng: np.random.Generator | None = None
+    ) -> ndarray:
+        """One photograph of several targets, (h,w) uint8.
+
+        Args:
+            stands: each target and camera_from_target, the one in front last.
+            rng: as in `photograph`.
+        Raises:
+            InputError: a target cannot be drawn.
+        """
         image = (
             np.full(self._valid.shape, BACKGROUND_LEVEL, dtype=np.float32)
             if rng is None
             else self._surroundings(rng)
         )
-        plane_from_ray = _plane_from_ray(camera_from_target)
-        for start in range(0, len(image), ROWS_AT_ONCE):
-            self._draw(sheet, plane_from_ray, image, start)
+        for target, camera_from_target in stands:
+            sheet = Sheet(target.drawing(), black=BLACK, white=WHITE)
+            plane_from_ray = _plane_from_ray(camera_from_target)
+            for start in range(0, len(image), ROWS):
+                self._draw(sheet, plane_from_ray, image, start)
         if rng is not None:
             image *= self._lighting(rng)
         image *= self._valid

@@ -83,6 +83,7 @@ class StepOneFit:
             energy=np.zeros((0, 0)),
             single=problem.single,
             precisions=problem.precisions,
+            parts=problem.parts,
         )  # fmt: skip
         known = other.known(other.linearise(self.estimate._replace(camera=camera), self.loss))
         return len(free) + float(known.surface.sum() + known.singles.sum())
@@ -94,9 +95,8 @@ class StepOneFit:
         if self.target == "flat":
             return TargetShape.flat(len(points))
         seen = self.problem.measurements.observations.present.max(0) > 0
-        return TargetShape(
-            self.target, without_similarity(points, self.problem.corners(self.estimate) - points, seen)
-        )
+        moved = self.problem.corners(self.estimate) - points
+        return TargetShape(self.target, without_similarity(points, moved, seen, parts=self.problem.parts))
 
 
 def fit_step_one(flat: Calibration, *, shape: str, first_lens: str) -> StepOneFit:
@@ -111,7 +111,8 @@ def fit_step_one(flat: Calibration, *, shape: str, first_lens: str) -> StepOneFi
     camera = _with_displacement(flat.camera) if first_lens == FREE else flat.camera
     observations = Observations.by_corner(detections)
     points, seen = detections.target.points, observations.present.max(0) > 0
-    basis = polynomials(points, seen) if shape != "flat" else np.zeros((len(points), 0))
+    parts = detections.target.parts
+    basis = polynomials(points, seen, parts=parts) if shape != "flat" else np.zeros((len(points), 0))
     energy = _energy(camera)
     measurements = Measurements(observations, camera, free, corners_move=shape != "flat")
     estimate = DecoupledEstimate(
@@ -136,6 +137,7 @@ def fit_step_one(flat: Calibration, *, shape: str, first_lens: str) -> StepOneFi
             energy=energy,
             single=shape == "free",
             precisions=precisions,
+            parts=parts,
         )
         options = Options(tolerance=LAST_TOLERANCE if last else ROUND_TOLERANCE, max_steps=50)
         if abs(evidence.noise / noise - 1.0) > KEPT_LOSS_SHARE:

@@ -15,7 +15,7 @@ from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
-from orthoscope.report.data.boards import board_corners, frustum
+from orthoscope.report.data.boards import board_corners, boards_in, frustum
 from orthoscope.report.figures.style import BLUE, COLUMN_WIDTH, INK, ORANGE, RED, styled
 
 __all__ = ["board_poses"]
@@ -78,8 +78,9 @@ def _frame_scene(axes: Axes3D, points: Float[ndarray, "n 3"]) -> None:
 
 def _boards(calibration: Calibration) -> Float[ndarray, "views 4 3"]:
     """The corners of each board's outline, camera frame, metres, beginning with that of corner 0."""
-    outline = board_corners(calibration.detections.target)
-    return np.array([pose.apply(outline) for pose in calibration.camera_from_target]).reshape(-1, 4, 3)
+    outlines = board_corners(calibration.detections.target)[boards_in(calibration.detections)]
+    seen = zip(calibration.camera_from_target, outlines, strict=True)
+    return np.array([pose.apply(outline) for pose, outline in seen]).reshape(-1, 4, 3)
 
 
 def _frustum(camera: Camera, boards: Float[ndarray, "views 4 3"]) -> Float[ndarray, "8 2 3"]:
