@@ -20,7 +20,8 @@ HEADS = {
 }
 
 
-NEARER = 0.5  # of the error far away: where the error at the target's distances is no more, both are told
+# Where the error at the target's distances is no more than this share of that far away, both are told.
+NEARER_SHARE = 0.5
 
 
 class Verdict(NamedTuple):
@@ -76,7 +77,7 @@ def _far(grade: Grade, s: Situation) -> str:
     if grade in (Grade.GOOD, Grade.REGION):
         seen = f"off by about {px(s.error_px)} px where corners were seen"
         return f"{HEADS[grade]}: {seen}, and by less than {FINE_PX:g} px over {_share(s.held)} of the frame."
-    if s.near_px <= NEARER * s.error_px:
+    if s.near_px <= NEARER_SHARE * s.error_px:
         near = f"off by about {px(s.near_px)} px at the distances where the target was"
         return f"{HEADS[grade]}: {near}, by {px(s.error_px)} px far away."
     return f"{HEADS[grade]}: off by about {px(s.error_px)} px where corners were seen."
