@@ -47,7 +47,7 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
         board: what to look for.
     """
     count = board.columns * board.rows
-    found = find_markers(grey, DICTIONARY, int(ENOUGH * count), border=BORDER)
+    found = find_markers(grey, DICTIONARY, int(ENOUGH_TAGS_SHARE * count), border=BORDER_SQUARES)
     numbers = found.numbers - board.first
     known = (numbers >= 0) & (numbers < count)
     markers = Markers(numbers[known], found.corners[known])

@@ -109,9 +109,9 @@ class Renderer:
             else self._surroundings(rng)
         )
         for target, camera_from_target in stands:
-            sheet = Sheet(target.drawing(), black=BLACK, white=WHITE)
+            sheet = Sheet(target.drawing(), black=BLACK_LEVEL, white=WHITE_LEVEL)
             plane_from_ray = _plane_from_ray(camera_from_target)
-            for start in range(0, len(image), ROWS):
+            for start in range(0, len(image), ROWS_AT_ONCE):
                 self._draw(sheet, plane_from_ray, image, start)
         if rng is not None:
             image *= self._lighting(rng)

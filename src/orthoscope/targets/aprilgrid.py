@@ -118,7 +118,7 @@ class AprilGrid(Board):
         gap = self.spacing * self.size
         points, shapes = self.points()[:, :2], []
         for number, (top_left, top_right, _, bottom_left) in enumerate(self.tag_corners()):
-            black = marker_modules(DICTIONARY, self.first + number, border=BORDER)
+            black = marker_modules(DICTIONARY, self.first + number, border=BORDER_SQUARES)
             black = np.rot90(black, 2)  # OpenCV prints these tags upside down
             shapes.append(np.tile(points[top_left], 2) + rectangles_of(black) * (self.size / len(black)))
             for corner, step in ((top_left, (-1, -1)), (top_right, (1, -1)), (bottom_left, (-1, 1))):

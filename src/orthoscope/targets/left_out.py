@@ -42,7 +42,7 @@ def _named(name: str, known: Sequence[str]) -> list[str]:
     alike = [each for each in known if PurePath(name).name in (PurePath(each).name, _file(each))]
     if len(alike) == 1 or len({photograph_of(each) for each in alike}) == 1:
         return alike
-    shown = ", ".join((alike or list(known))[:SHOWN])
+    shown = ", ".join((alike or list(known))[:LISTED_PHOTOGRAPHS])
     raise InputError(f"--without {name!r} names no single photograph; expected one such as {shown}.")
 
 

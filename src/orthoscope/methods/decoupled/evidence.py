@@ -133,7 +133,7 @@ def _likeness(problem: Joint, unknowns: DecoupledEstimate, noise: float) -> floa
     variance would give.
     """
     seen = problem.measurements.observations.present
-    patterns = polynomials(problem.points, seen.max(0) > 0, orders=SMOOTH, parts=problem.parts)
+    patterns = polynomials(problem.points, seen.max(0) > 0, orders=SMOOTH_ORDERS, parts=problem.parts)
     found = np.einsum("pr,mpa->mra", patterns, problem.residuals(unknowns))
     expected = noise * (seen @ patterns**2)
     return max(1.0, float((found**2).sum() / (2.0 * expected.sum())))
