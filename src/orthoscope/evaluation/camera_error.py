@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.evaluation.verdict.situation import FINE_PX
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.scatter import Scatter
 from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
@@ -42,10 +43,6 @@ MAP_ROWS = 21
 DIRECTION_COUNT = 48
 # The region is grown in so many steps.
 REGION_STEPS = 20
-# Where the error is more than so many times that over the seen part, the camera is not to be used.
-GENEROUS_RATIO = 2.0
-# No place is given up whose error is below this, pixels.
-NEGLIGIBLE_PX = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +60,8 @@ class CameraError:
         distance: of the target, metres, in the typical view.
         far, near: (rows, columns) over the frame, row by row, at the cells' centres; NaN where the camera has
             no image.
-        limit_px: where the error is larger the camera is not to be used.
-        region: (n,2) pixels, the polygon of the places where it may be.
+        limit_px: where the error is larger the camera is not called good; the limit of the grades.
+        region: (n,2) pixels, the polygon of the places where it is smaller and corners were seen around.
         without_px: (m,) of each photograph, by how much the image over the seen part moves without it; NaN
             where the others cannot tell.
     """
@@ -168,7 +165,6 @@ def predicted_error(
     far = _Variances(scatter, richest, places, len(seen), np.inf)
     near = _Variances(scatter, richest, lengths[:, None] * places, len(seen), typical)
     seen_px, model_px, alike_px, views_px, bias_px = far.over(part_seen)
-    limit = max(GENEROUS_RATIO * seen_px, NEGLIGIBLE_PX)
     along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(DIRECTION_COUNT, REGION_STEPS)
     return CameraError(
         seen_px=seen_px,
@@ -182,8 +178,8 @@ def predicted_error(
         distance=typical,
         far=np.sqrt(far.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
         near=np.sqrt(near.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
-        limit_px=limit,
-        region=_grown(middle, ways, along <= limit),
+        limit_px=FINE_PX,
+        region=_grown(middle, ways, (along <= FINE_PX) & _between(seen, ways)),
         without_px=np.sqrt(far.moved[part_seen].mean(0)),
     )
 
@@ -260,6 +256,13 @@ def _grown(
     reached = np.where(good.all(1), REGION_STEPS, np.argmin(good, axis=1))
     edge = ways[np.arange(len(ways)), np.maximum(reached - 1, 0)]
     return np.where(reached[:, None] > 0, edge, middle)
+
+
+def _between(seen: Float[ndarray, "s 2"], ways: ndarray) -> Bool[ndarray, "directions steps"]:
+    """Whether places lie in the convex hull of the seen ones: no farther out than they in any direction."""
+    angle = 2.0 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
+    outwards = np.stack([np.cos(angle), np.sin(angle)])
+    return (ways @ outwards <= (seen @ outwards).max(0)).all(-1)
 
 
 def _inside(polygon: Float[ndarray, "n 2"], pixels: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
