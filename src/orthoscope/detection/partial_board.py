@@ -30,7 +30,7 @@ NEARLY_WORST = 0.8  # of the worst stray
 LEAST_LEFT = 0.5  # of the corners, after that: with fewer it was a lattice by chance
 LEAST_CONTRAST = 0.3  # of the usual strength of a corner
 LINE_GOES_ON = 0.6  # of the corners of a line that are in the picture
-LINE_ENDS = 0.75  # of its squares: they alternate, and behind the black ones is white
+LINE_ENDS = 0.75  # of its squares: they alternate, and behind them is white
 THIN = 0.34  # of the next line's corners: a line at the rim with fewer, and fewer than three, is chance
 LINES_BEFORE = 4  # which a line is compared with
 
@@ -232,8 +232,11 @@ def _ends(grey: ndarray, grid: ndarray) -> bool:
     dark = near < before
     same = np.abs(far - near) < 2.0 * contrast
     alternates = np.abs(near - before) > 0.5 * np.median(np.abs(near - before))
-    paper = beyond > level
-    return bool((same & alternates).mean() >= LINE_ENDS and dark.any() and paper[dark].mean() >= LINE_ENDS)
+    paper = beyond > level  # behind the bright ones too: where the board goes on, there are dark squares
+    if dark.all() or not dark.any():
+        return False
+    ends = min((same & alternates).mean(), paper[dark].mean(), paper[~dark].mean())
+    return bool(ends >= LINE_ENDS)
 
 
 def _in_picture(grey: ndarray, places: ndarray) -> ndarray:
