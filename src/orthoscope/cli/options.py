@@ -20,13 +20,13 @@ __all__ = [
     "cluster",
     "fit",
     "folds",
-    "folds_anew",
     "image_size",
     "jobs",
     "keep",
     "lens",
     "loss",
     "method",
+    "own_folds",
     "photos",
     "shape",
     "skew",
@@ -216,10 +216,13 @@ folds: Decorator = click.option(
     type=click.IntRange(2),
     help="Parts that the views are held out in.",
 )
-folds_anew: Decorator = click.option(
+own_folds: Decorator = click.option(
     "--folds",
     type=click.IntRange(2),
-    help="Judge anew, holding the views out in so many parts, though an evaluation.json is at hand.",
+    help=(
+        "Hold the views out in so many parts, everything fitted again without each; by default each is left"
+        " out in its turn by one linear step."
+    ),
 )
 jobs: Decorator = click.option(
     "--jobs",

@@ -32,8 +32,10 @@ from orthoscope.targets.target import Target
 
 __all__ = ["detect"]
 
-LISTED = 5  # photographs whose reasons are told where none showed the target
-LOOKED_AT = 3  # photographs that are then looked at for a board of another size
+# Where none showed the target the reasons of so many photographs are told.
+LISTED_PHOTOGRAPHS = 5
+# Where none showed the target so many photographs are looked at for a board of another size.
+TRIED_PHOTOGRAPHS = 3
 
 
 class _Look(NamedTuple):
@@ -155,8 +157,8 @@ def _sorted_out(
 def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, aside: list[SetAside]) -> str:
     """Why no photograph could be used, and which board seems to be there instead."""
     readable = [picture for picture, look in zip(given, looks, strict=True) if look.size]
-    reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:LISTED])
-    if more := len(aside) - LISTED:
+    reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:LISTED_PHOTOGRAPHS])
+    if more := len(aside) - LISTED_PHOTOGRAPHS:
         reasons += f"\n  and {more} more" if more > 0 else ""
     if not readable:
         return f"none of {len(given)} photographs can be read; expected images. Look at them:{reasons}"
@@ -174,7 +176,7 @@ def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, asi
 
 def _board_instead(given: list[Picture], target: Chessboard) -> tuple[int, int] | None:
     """The size of the board that most of a few photographs show, where it is not the target's."""
-    few = given[:: max(1, len(given) // LOOKED_AT)][:LOOKED_AT]
+    few = given[:: max(1, len(given) // TRIED_PHOTOGRAPHS)][:TRIED_PHOTOGRAPHS]
     seen = Counter(board for picture in few if (board := board_size(picture.grey(most_megapixels=np.inf))))
     others = {board: count for board, count in seen.items() if sorted(board) != sorted(target.grid)}
     return max(others, key=lambda board: others[board], default=None)

@@ -28,7 +28,8 @@ from orthoscope.targets.detections import Detections, View
 
 __all__ = ["at_disc_centres", "disc_offsets", "has_outlines"]
 
-RIM_POINTS = 48  # as many as the detector looks for on an outline
+# A disc's outline has as many points here as the detector looks for.
+RIM_POINTS = 48
 
 
 def has_outlines(detections: Detections) -> bool:

@@ -15,17 +15,20 @@ from typing import Any
 from orthoscope.models.lenses import LENSES
 from orthoscope.paper.entries import PAPER, every_lens, fair_peers
 from orthoscope.paper.eq7_searches import ALIKE, DAMPINGS, WEIGHTS, Eq7Search, member, rivals
-from orthoscope.paper.photographs import SPLITS, check_views, grids_of, split_outcomes
+from orthoscope.paper.photographs import SPLIT_COUNT, check_views, grids_of, split_outcomes
 from orthoscope.paper.subgrids import subgrids
 from orthoscope.paper.trials import Condition, Outcome, Study, trial_outcomes
 from orthoscope.targets.detections import Detections
 
-__all__ = ["BOARD", "PAPERS_NOISE", "SCENES", "Plan", "Results", "run"]
+__all__ = ["PAPER_BOARD", "PAPER_NOISE_PX", "SCENES", "Plan", "Results", "run"]
 
 SCENES = ("low", "high")
-BOARD = (14, 20)  # inner corners of the paper's sheet
-PAPERS_NOISE = 0.1  # px; "some existing corner detection algorithms claim an accuracy of 0.1 pixels"
-GRIDS = 8
+# The paper's sheet has so many inner corners.
+PAPER_BOARD = (14, 20)
+# The paper says that "some existing corner detection algorithms claim an accuracy of 0.1 pixels".
+PAPER_NOISE_PX = 0.1
+# So many numbers of points are tried, each of them a part of the paper's sheet.
+GRID_COUNT = 8
 
 Progress = Callable[[int, int], None]
 
@@ -44,13 +47,13 @@ class Plan:
     seed: int = 0
     board: tuple[int, int] | None = None
     noise_px: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
-    points: tuple[tuple[int, int], ...] = subgrids(BOARD, GRIDS)
+    points: tuple[tuple[int, int], ...] = subgrids(PAPER_BOARD, GRID_COUNT)
     images: tuple[int, ...] = (1, 2, 3, 4, 5, 7, 10, 15)
     lenses: tuple[str, ...] = tuple(LENSES)
     dampings: tuple[tuple[str, float], ...] = DAMPINGS
     weights: tuple[tuple[float, float, float], ...] = WEIGHTS
-    eq7: Condition = Condition(PAPERS_NOISE)
-    grids: int = GRIDS
+    eq7: Condition = Condition(PAPER_NOISE_PX)
+    grids: int = GRID_COUNT
     most_table_trials: int = 5
 
     @classmethod
@@ -65,7 +68,7 @@ class Plan:
             images=(1, 4),
             lenses=("brown",),
             dampings=(DAMPINGS[0], DAMPINGS[3]),
-            eq7=Condition(PAPERS_NOISE, (5, 7), 5),
+            eq7=Condition(PAPER_NOISE_PX, (5, 7), 5),
             grids=2,
             most_table_trials=1,
         )
@@ -85,17 +88,17 @@ class Plan:
         )
         sizes = tuple(float(columns * rows) for columns, rows in self.points)
         points = Study(
-            "points", sizes, tuple(Condition(PAPERS_NOISE, grid) for grid in self.points), everyone
+            "points", sizes, tuple(Condition(PAPER_NOISE_PX, grid) for grid in self.points), everyone
         )
         images = Study(
             "images",
             tuple(map(float, self.images)),
-            tuple(Condition(PAPERS_NOISE, self.board, m) for m in self.images),
+            tuple(Condition(PAPER_NOISE_PX, self.board, m) for m in self.images),
             everyone,
         )
         exact = Study("exact", sizes[:1], (Condition(0.0, self.points[0]),), everyone)
         lenses = Study(
-            "lenses", (PAPERS_NOISE,), (Condition(PAPERS_NOISE, self.board),), every_lens(self.lenses)
+            "lenses", (PAPER_NOISE_PX,), (Condition(PAPER_NOISE_PX, self.board),), every_lens(self.lenses)
         )
         return (
             *((study, self.trials) for study in (noise, points, images)),
@@ -148,7 +151,7 @@ def run(
     real = (
         [
             partial(split_outcomes, detections, turn, grids=grids_of(detections, plan.grids))
-            for turn in range(SPLITS)
+            for turn in range(SPLIT_COUNT)
         ]
         if detections
         else []

@@ -27,10 +27,16 @@ from orthoscope.targets.markers import (
     split_first,
 )
 
-__all__ = ["BORDER", "DICTIONARY", "TAG_SQUARES", "AprilGrid"]
+__all__ = ["BORDER_SQUARES", "DICTIONARY", "TAG_SQUARES", "AprilGrid"]
 
-DICTIONARY, TAGS = "DICT_APRILTAG_36h11", 587  # the family, and how many tags it has
-BORDER, TAG_SQUARES = 2, 10  # squares of a tag's border, and along its whole side
+# The tags are of this family.
+DICTIONARY = "DICT_APRILTAG_36h11"
+# The family has so many tags.
+TAG_COUNT = 587
+# A tag's border has so many squares.
+BORDER_SQUARES = 2
+# A tag has so many squares along its whole side.
+TAG_SQUARES = 10
 
 
 @dataclass(frozen=True)
@@ -54,12 +60,12 @@ class AprilGrid(Board):
     first: int = 0
 
     def __post_init__(self) -> None:
-        tags = 0 < self.columns * self.rows <= TAGS
+        tags = 0 < self.columns * self.rows <= TAG_COUNT
         if not (tags and can_be_printed(self.columns, self.rows, self.size) and 0 < self.spacing <= 1):
             raise InputError(
                 f"an AprilGrid of {self.columns}x{self.rows} tags of {self.size:g} m with gaps of"
-                f" {self.spacing:g} of that cannot be used; expected 1 to {TAGS} tags and gaps above 0 up to"
-                f" 1, such as {self.example}."
+                f" {self.spacing:g} of that cannot be used; expected 1 to {TAG_COUNT} tags and gaps above 0"
+                f" up to 1, such as {self.example}."
             )
         check_numbers(self.description, *self.markers)
 
@@ -112,7 +118,7 @@ class AprilGrid(Board):
         gap = self.spacing * self.size
         points, shapes = self.points()[:, :2], []
         for number, (top_left, top_right, _, bottom_left) in enumerate(self.tag_corners()):
-            black = marker_modules(DICTIONARY, self.first + number, border=BORDER)
+            black = marker_modules(DICTIONARY, self.first + number, border=BORDER_SQUARES)
             black = np.rot90(black, 2)  # OpenCV prints these tags upside down
             shapes.append(np.tile(points[top_left], 2) + rectangles_of(black) * (self.size / len(black)))
             for corner, step in ((top_left, (-1, -1)), (top_right, (1, -1)), (bottom_left, (-1, 1))):

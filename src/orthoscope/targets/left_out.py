@@ -9,10 +9,12 @@ from pathlib import PurePath
 from orthoscope.geometry.arrays import InputError
 from orthoscope.targets.detections import Detections, SetAside, photograph_of
 
-__all__ = ["LEFT_OUT", "left_out"]
+__all__ = ["LEFT_OUT_REASON", "left_out"]
 
-LEFT_OUT = "left out by --without"  # the reason that such a photograph has
-SHOWN = 6  # names of photographs in an error
+# A photograph that `--without` leaves out has this reason.
+LEFT_OUT_REASON = "left out by --without"
+# An error lists so many names of photographs.
+LISTED_PHOTOGRAPHS = 6
 
 
 def left_out(detections: Detections, names: Sequence[str]) -> Detections:
@@ -29,7 +31,7 @@ def left_out(detections: Detections, names: Sequence[str]) -> Detections:
     kept = [i for i, view in enumerate(views) if view.image not in out]
     if not kept:
         raise InputError("--without leaves no photograph; expected some to calibrate from. Leave out fewer.")
-    aside = (SetAside(view.image, LEFT_OUT) for view in views if view.image in out)
+    aside = (SetAside(view.image, LEFT_OUT_REASON) for view in views if view.image in out)
     return replace(detections.only(kept), set_aside=(*detections.set_aside, *aside))
 
 
@@ -40,7 +42,7 @@ def _named(name: str, known: Sequence[str]) -> list[str]:
     alike = [each for each in known if PurePath(name).name in (PurePath(each).name, _file(each))]
     if len(alike) == 1 or len({photograph_of(each) for each in alike}) == 1:
         return alike
-    shown = ", ".join((alike or list(known))[:SHOWN])
+    shown = ", ".join((alike or list(known))[:LISTED_PHOTOGRAPHS])
     raise InputError(f"--without {name!r} names no single photograph; expected one such as {shown}.")
 
 

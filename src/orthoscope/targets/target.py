@@ -23,7 +23,7 @@ from orthoscope.targets.drawing import Drawing
 __all__ = ["TOGETHER", "Target", "chessboard", "several", "target_of"]
 
 # Points nearer to the drawn ones than this share of the board's size are where they are drawn.
-FARTHEST_OFF = 1e-6
+FARTHEST_OFF_SHARE = 1e-6
 # What stands between the names of targets that were photographed together.
 TOGETHER = " + "
 # The gap between members that stand side by side, as a share of the larger one's width.
@@ -118,7 +118,7 @@ class Target:
             )
         printed = self.board.points()
         step = self.points[0] - printed[0]
-        if np.abs(self.points - printed - step).max() > FARTHEST_OFF * np.ptp(printed, axis=0).max():
+        if np.abs(self.points - printed - step).max() > FARTHEST_OFF_SHARE * np.ptp(printed, axis=0).max():
             raise InputError(
                 f"target {self.name!r} has points that are not where {self.board.description} has them, so it"
                 " cannot be drawn; expected a target as its description makes it."

@@ -34,7 +34,8 @@ from orthoscope.solve.losses import Loss
 
 __all__ = ["DecoupledEstimate", "Joint", "Known", "Precisions"]
 
-ROUNDING = 1e-13  # of a scaled system: what is added to its diagonal before it is inverted
+# This is added to a scaled system's diagonal before it is inverted.
+ROUNDING_SHARE = 1e-13
 
 
 class DecoupledEstimate(NamedTuple):
@@ -247,5 +248,5 @@ def _inverse(matrix: Float[ndarray, "n n"]) -> Float[ndarray, "n n"]:
     """Of a symmetric positive system, whatever its units."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix * scale * scale[:, None]
-    scaled[np.diag_indices_from(scaled)] += ROUNDING
+    scaled[np.diag_indices_from(scaled)] += ROUNDING_SHARE
     return np.linalg.inv(scaled) * scale * scale[:, None]
