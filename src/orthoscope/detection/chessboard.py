@@ -18,6 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from orthoscope.detection.board_marks import ways_by_marks
 from orthoscope.detection.copies import resized, to_photograph
 from orthoscope.detection.grid import cross, grid_shape
 from orthoscope.detection.lattices import CornerLattice, lattices
@@ -28,6 +29,7 @@ from orthoscope.detection.saddle_points import saddle_points
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import Bool, Float, InputError, Int, ndarray
 from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.marked_chessboard import MarkedChessboard
 
 __all__ = ["board_size", "find_chessboard", "see_chessboard"]
 
@@ -57,7 +59,7 @@ RIM_PX = 2.0
 MOST_DOUBTFUL_SHARE = 0.4
 
 
-def see_chessboard(grey: ndarray, board: Chessboard) -> Sight | Unseen:
+def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | Unseen:
     """The inner corners of a board, or of the part of it that can be seen.
 
     Rows and columns lie as x and y do, seen from the front. Corner 0 is the one with a dark square beyond it,
@@ -128,14 +130,19 @@ def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray]]:
                 yield found, copy
 
 
-def _on_board(grey: ndarray, grid: Grid, board: Chessboard) -> Sight | None:
+def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> Sight | None:
     """The corners with their ids, refined; None where the grid is not the board's or the ids are open."""
     ways = placements(grid, board.columns, board.rows)
+    arms = np.ones(grid.seen.shape)
+    if isinstance(board, MarkedChessboard):
+        ways = ways_by_marks(grey, grid, ways, board)
     if not ways or not _alike(ways, grid.seen, board.symmetries()):
         return None
     whole = grid.seen.size == board.columns * board.rows
     ids = _first_way(ways, grid.corners, whole)
-    pixels, good = _refined(grey, grid.corners, grid.seen)
+    if isinstance(board, MarkedChessboard):
+        arms[np.isin(ids, board.marked_corners())] = board.arm
+    pixels, good = _refined(grey, grid.corners, grid.seen, arms)
     order = np.argsort(ids[good])
     return Sight(ids[good][order], pixels[good][order])
 
@@ -157,13 +164,16 @@ def _first_way(ways: list[ndarray], corners: ndarray, whole: bool) -> Int[ndarra
 
 
 def _refined(
-    grey: ndarray, corners: Float[ndarray, "r c 2"], seen: Bool[ndarray, "r c"]
+    grey: ndarray,
+    corners: Float[ndarray, "r c 2"],
+    seen: Bool[ndarray, "r c"],
+    arms: Float[ndarray, "r c"],
 ) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"]]:
     """The grid's corners in the photograph, and which of them are good."""
     inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(-1)
     row, column = np.nonzero(seen | inside)
     places = np.stack([column, row], axis=1).astype(float)
-    fine = refined(grey, corners[row, column], places)
+    fine = refined(grey, corners[row, column], places, arm=arms[row, column])
     off = _off(fine, places)
     for _ in range(REPAIR_ROUNDS):
         if not off.any() or off.all():
@@ -171,7 +181,7 @@ def _refined(
         known = np.full_like(corners, np.nan)
         known[row[~off], column[~off]] = fine.pixels[~off]
         start = np.where(off[:, None], filled(known)[row, column], fine.pixels)
-        again = refined(grey, start, places, approach=False)
+        again = refined(grey, start, places, approach=False, arm=arms[row, column])
         fine = Refined(
             np.where(off[:, None], again.pixels, fine.pixels), np.where(off, again.believed, fine.believed)
         )
@@ -196,7 +206,7 @@ def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
     )
 
 
-def _by_opencv(grey: ndarray, board: Chessboard) -> Sight | None:
+def _by_opencv(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | None:
     """What OpenCV's finders see, if it is the whole board."""
     for rough in opencv_boards(grey, board.columns, board.rows):
         corners = rough.reshape(board.rows, board.columns, 2)

@@ -36,7 +36,7 @@ LEAST_LEFT_SHARE = 0.5
 LEAST_CONTRAST_SHARE = 0.3
 # A line goes on where at least this share of its corners that are in the picture stands out.
 GOING_ON_SHARE = 0.6
-# The board ends where this share of a line's squares alternates, with white behind the black ones.
+# The board ends where this share of a line's squares alternates, with white behind them.
 BLANK_SQUARES_SHARE = 0.75
 # A line at the rim with fewer than three corners, and less than this share of the next line's, is chance.
 THIN_LINE_SHARE = 0.34
@@ -242,12 +242,11 @@ def _ends(grey: ndarray, grid: ndarray) -> bool:
     dark = near < before
     same = np.abs(far - near) < 2.0 * contrast
     alternates = np.abs(near - before) > 0.5 * np.median(np.abs(near - before))
-    paper = beyond > level
-    return bool(
-        (same & alternates).mean() >= BLANK_SQUARES_SHARE
-        and dark.any()
-        and paper[dark].mean() >= BLANK_SQUARES_SHARE
-    )
+    paper = beyond > level  # behind the bright ones too: where the board goes on, there are dark squares
+    if dark.all() or not dark.any():
+        return False
+    ends = min((same & alternates).mean(), paper[dark].mean(), paper[~dark].mean())
+    return bool(ends >= BLANK_SQUARES_SHARE)
 
 
 def _in_picture(grey: ndarray, places: ndarray) -> ndarray:

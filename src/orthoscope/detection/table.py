@@ -15,12 +15,14 @@ from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.circles import Circles
+from orthoscope.targets.marked_chessboard import MarkedChessboard
 from orthoscope.targets.target import Target
 
 __all__ = ["DETECTORS", "check_can_be_seen", "see"]
 
 DETECTORS: dict[str, Callable[[ndarray, Any], Sight | Unseen]] = {
     Chessboard.kind: see_chessboard,
+    MarkedChessboard.kind: see_chessboard,
     Charuco.kind: see_charuco,
     AprilGrid.kind: see_aprilgrid,
     Circles.kind: see_circles,
