@@ -1,7 +1,7 @@
 """Films as the sensor saw them: a telephone that was held upright marks its films to be shown turned.
 
 The frames in the file are the sensor's, and so is a camera model; the mark turns nothing that is read here.
-In MP4 and MOV it is a matrix in the header of the track (`tkhd`, ISO/IEC 14496-12, 8.3.2), a turn by quarters.
+MP4 and MOV mark it by a matrix in the header of the track (`tkhd`, ISO/IEC 14496-12, 8.3.2), by quarters.
 """
 
 from __future__ import annotations
