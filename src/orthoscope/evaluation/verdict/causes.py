@@ -39,7 +39,7 @@ NAMED_IMAGES = 3
 class Cause(NamedTuple):
     """Something that may limit a camera.
 
-    Args:
+    Attributes:
         name: in a file and in tests.
         holds: whether it does.
         allows: the best grade with it.

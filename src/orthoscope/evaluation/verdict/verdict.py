@@ -23,7 +23,7 @@ HEADS = {
 class Verdict(NamedTuple):
     """What a user should know before anything else.
 
-    Args:
+    Attributes:
         grade: how far the camera may be trusted.
         cause: the name of what limits it; empty where nothing does.
         far: how far off it is, and where that holds.
