@@ -12,7 +12,7 @@ __all__ = ["Sight", "Unseen"]
 class Sight(NamedTuple):
     """Corners that were found.
 
-    Args:
+    Attributes:
         ids: (n,) rows of the target's points, ascending.
         pixels: (n,2) where they are.
     """

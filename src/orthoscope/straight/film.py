@@ -119,7 +119,8 @@ def _with_pyav(
 def _part_of(place: Path) -> Path:
     """Where a film is written until it is whole; makes its folder.
 
-    Raises InputError where the name is no film's or the folder cannot be made.
+    Raises:
+        InputError: the name is no film's or the folder cannot be made.
     """
     suffix = place.suffix.lower()
     if suffix not in CODECS:

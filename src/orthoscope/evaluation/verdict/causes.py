@@ -41,7 +41,7 @@ ADRIFT_SHARE = 0.1
 class Cause(NamedTuple):
     """Something that may limit a camera.
 
-    Args:
+    Attributes:
         name: in a file and in tests.
         holds: whether it does.
         allows: the best grade with it.

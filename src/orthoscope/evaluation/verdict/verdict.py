@@ -27,7 +27,7 @@ NEARER_SHARE = 0.5
 class Verdict(NamedTuple):
     """What a user should know before anything else.
 
-    Args:
+    Attributes:
         grade: how far the camera may be trusted.
         cause: the name of what limits it; empty where nothing does.
         far: how far off it is, and where that holds.
