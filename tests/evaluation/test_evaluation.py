@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ from orthoscope.fitting.calibration import rms
 from orthoscope.fitting.held_out import held_out
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
+from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
@@ -95,6 +98,31 @@ def test_what_is_held_out_is_held_out_by_the_calibrations_own_method_and_setting
     with ThreadPoolExecutor(2) as executor:
         evaluation = evaluate(calibration, folds=4, executor=executor)
     assert_array_equal(np.array(evaluation.held_out_residuals), np.array(expected.residuals))
+
+
+@pytest.mark.parametrize("fit", [partial(fccm, lens="brown:k1,k2"), decoupled])
+def test_each_photograph_left_out_by_one_step_is_foreseen_as_by_fits_without_it(fit):
+    calibration = fit(photographs_of(bent(1.0), 6, 1))
+    by_step, by_fits = evaluate(calibration), evaluate(calibration, folds=6)
+    assert (by_step.folds, by_fits.folds) == (0, 6)
+    assert_allclose(by_step.held_out_rms_px, by_fits.held_out_rms_px, rtol=0.03)
+    assert_allclose(by_step.nce, by_fits.nce, rtol=0.05)
+    assert_allclose(*([rms(e) for e in found.held_out_residuals] for found in (by_step, by_fits)), rtol=0.1)
+
+
+def test_what_the_method_has_fitted_is_not_fitted_again(monkeypatch):
+    calibration = decoupled(photographs_of(bent(1.0), 8, 1))
+    found = evaluate(calibration)
+    again = evaluate(pickle.loads(pickle.dumps(calibration)))  # what is kept is not sent
+    assert_allclose(again.held_out_rms_px, found.held_out_rms_px, rtol=1e-6)
+    assert_allclose(again.error.seen_px, found.error.seen_px, rtol=1e-6)
+
+    def fitted(*_args, **_how):
+        raise AssertionError("fitted again")
+
+    monkeypatch.setattr("orthoscope.methods.decoupled.candidates.fit_step_one", fitted)
+    monkeypatch.setattr("orthoscope.methods.decoupled.candidates.fit_flat", fitted)
+    assert evaluate(calibration).held_out_rms_px == found.held_out_rms_px
 
 
 def test_a_lens_that_folds_over_inside_the_data_is_not_to_be_used():

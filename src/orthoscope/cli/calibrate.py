@@ -39,7 +39,7 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @options.skew
 @options.loss
 @options.image_size
-@options.folds
+@options.own_folds
 @click.option(
     "--without",
     multiple=True,
@@ -103,7 +103,7 @@ def calibrate_into(
     skew: bool = False,
     loss: str | None = None,
     image_size: tuple[int, int] | None = None,
-    folds: int = 5,
+    folds: int | None = None,
     without: tuple[str, ...] = (),
     more: tuple[str, ...] = (),
     jobs: int | None = None,
@@ -119,7 +119,7 @@ def calibrate_into(
     """The main job; prints the summary and returns the evaluation."""
     from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.judged import EVALUATION
+    from orthoscope.cli.judged import EVALUATION_NAME
     from orthoscope.cli.method_settings import settings_from
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines
@@ -155,7 +155,7 @@ def calibrate_into(
         calibration = run(detections, method=method, **given, **told)
     with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
         evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
-    for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION)):
+    for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION_NAME)):
         save(thing, out / name)
         written.append(out / name)
     if corrected:
@@ -230,7 +230,7 @@ def _write_straight(
             " with the photographs."
         )
     calibration = evaluation.calibration
-    paths = [files[view.image] for view in calibration.detections.views]
+    paths = list(dict.fromkeys(files[view.image] for view in calibration.detections.views))
     view = straight_camera(calibration.camera, keep=keep)
     written, _ = straighten(
         paths, calibration.camera, out / "undistorted", view=view, jobs=jobs, cluster=cluster

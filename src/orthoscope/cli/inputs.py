@@ -13,7 +13,7 @@ from orthoscope.cli.telling import tell
 from orthoscope.formats.corners_vnl import read_vnl
 from orthoscope.formats.own.json import load_detections
 from orthoscope.geometry.arrays import InputError
-from orthoscope.targets.detections import Detections
+from orthoscope.targets.detections import Detections, photograph_of
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
@@ -60,4 +60,9 @@ def detections_from(
     found = detect(files, target, jobs=jobs, executor=executor, progress=progress, most_megapixels=most)
     if others := passed_over(paths, also=FILMS):
         tell(f"passed over {', '.join(f'{count} {end}' for end, count in others.items())}", err=True)
-    return found, dict(zip(names_of(files), files, strict=True))
+    named = dict(zip(names_of(files), files, strict=True))
+    return found, named | {
+        view.image: named[photograph]
+        for view in found.views
+        if (photograph := photograph_of(view.image)) in named
+    }

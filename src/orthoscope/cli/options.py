@@ -20,13 +20,13 @@ __all__ = [
     "cluster",
     "fit",
     "folds",
-    "folds_anew",
     "image_size",
     "jobs",
     "keep",
     "lens",
     "loss",
     "method",
+    "own_folds",
     "photos",
     "shape",
     "skew",
@@ -142,8 +142,10 @@ photos: Decorator = click.argument("photos", nargs=-1, required=True, metavar="P
 target: Decorator = click.option(
     "--target",
     metavar="SPEC",
+    multiple=True,
+    callback=lambda _, __, given: " + ".join(given) or None,
     help=(
-        "What was photographed: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g."
+        "What was photographed, once for each board that the photographs show: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g."
         " chessboard:9x6:25mm; charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:legacy], counting squares;"
         " aprilgrid:COLUMNSxROWS:TAG:SPACING, counting tags; or a target.yaml of Kalibr."
     ),
@@ -214,10 +216,13 @@ folds: Decorator = click.option(
     type=click.IntRange(2),
     help="Parts that the views are held out in.",
 )
-folds_anew: Decorator = click.option(
+own_folds: Decorator = click.option(
     "--folds",
     type=click.IntRange(2),
-    help="Judge anew, holding the views out in so many parts, though an evaluation.json is at hand.",
+    help=(
+        "Hold the views out in so many parts, everything fitted again without each; by default each is left"
+        " out in its turn by one linear step."
+    ),
 )
 jobs: Decorator = click.option(
     "--jobs",

@@ -27,7 +27,7 @@ where it is missing, of another calibration, or --folds is asked for.
 @click.option(
     "--photos", multiple=True, metavar="PHOTOS", help="The photographs, to show them with their corners."
 )
-@options.folds_anew
+@options.own_folds
 @options.keep
 @options.jobs
 @options.cluster

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["camera_numbers", "evaluation_lines", "to_json"]
 
-SHOWN = 6  # photographs set aside that are listed one by one
+# So many photographs that were set aside are listed one by one.
+LISTED_PHOTOGRAPHS = 6
 
 
 def evaluation_lines(evaluation: Evaluation, *, verbose: bool = False) -> list[str]:
@@ -63,9 +64,11 @@ def _details(evaluation: Evaluation) -> list[str]:
     calibration = evaluation.calibration
     detections, camera, aside = calibration.detections, calibration.camera, calibration.detections.set_aside
     deviations = calibration.uncertainty.deviations
-    lines = [f"set aside  {entry.image}: {entry.reason}" for entry in aside[:SHOWN]]
+    lines = [f"set aside  {entry.image}: {entry.reason}" for entry in aside[:LISTED_PHOTOGRAPHS]]
     lines += (
-        [f"           and {len(aside) - SHOWN} more, all in detections.json"] if len(aside) > SHOWN else []
+        [f"           and {len(aside) - LISTED_PHOTOGRAPHS} more, all in detections.json"]
+        if len(aside) > LISTED_PHOTOGRAPHS
+        else []
     )
     lines += _outlier_lines(detections.outliers)
     lines += [f"suspect    {image}: {reason}" for image, reason in evaluation.suspects]
@@ -76,8 +79,12 @@ def _details(evaluation: Evaluation) -> list[str]:
     )
     if not math.isnan(evaluation.held_out_rms_px):
         lines.append(
-            f"held out   {with_error(evaluation.held_out_rms_px, evaluation.held_out_error_px)} px per point, on"
-            " views that were not used"
+            f"held out   {with_error(evaluation.held_out_rms_px, evaluation.held_out_error_px)} px per point, "
+            + (
+                "each photograph left out in its turn"
+                if not evaluation.folds
+                else f"in {evaluation.folds} folds"
+            )
         )
     lines.append(f"NCE        {evaluation.nce:.3f} (1 is what rounding to whole pixels would give)")
     lines.append(f"misfit     {_misfit_line(evaluation.misfit.target.test, evaluation.misfit.lens.test)}")
@@ -160,8 +167,8 @@ def _outlier_lines(outliers: tuple[Outlier, ...]) -> list[str]:
     if not outliers:
         return []
     counts = Counter(outlier.image for outlier in outliers)
-    shown = ", ".join(f"{image} ({count})" for image, count in list(counts.items())[:SHOWN])
-    more = f" and {len(counts) - SHOWN} more" if len(counts) > SHOWN else ""
+    shown = ", ".join(f"{image} ({count})" for image, count in list(counts.items())[:LISTED_PHOTOGRAPHS])
+    more = f" and {len(counts) - LISTED_PHOTOGRAPHS} more" if len(counts) > LISTED_PHOTOGRAPHS else ""
     return [f"outliers   {len(outliers)} corner{'s' if len(outliers) > 1 else ''} left out: {shown}{more}"]
 
 

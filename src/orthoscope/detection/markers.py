@@ -21,9 +21,12 @@ from orthoscope.targets.markers import dictionary
 
 __all__ = ["Markers", "find_markers", "homography_of", "of_one_board"]
 
-SIDES = (1280, 640, 2560)  # px, of the copies
-LOOSE = 0.6  # of a marker's side: so far its neighbours foresee it, at worst
-NEIGHBOURS = 6  # of a marker, on the board
+# Copies have these longer sides, pixels.
+COPY_SIDES = (1280, 640, 2560)
+# Its neighbours foresee a marker, at worst, to this share of its side.
+LOOSE_SHARE = 0.6
+# So many neighbours of a marker on the board foresee it.
+NEIGHBOUR_COUNT = 6
 
 
 class Markers(NamedTuple):
@@ -52,7 +55,7 @@ def find_markers(grey: ndarray, name: str, enough: int, *, border: int = 1) -> M
     detector = cv2.aruco.ArucoDetector(dictionary(name), parameters)
     best = Markers(np.zeros(0, dtype=int), np.zeros((0, 4, 2)))
     shapes = set()
-    for side in SIDES:
+    for side in COPY_SIDES:
         copy = resized(grey, side)
         if copy.shape in shapes or min(copy.shape) < 16:
             continue
@@ -78,7 +81,7 @@ def of_one_board(markers: Markers, plane: Float[ndarray, "n 4 2"]) -> Bool[ndarr
         return np.ones(count, dtype=bool)
     middles = plane.mean(1)
     apart = np.linalg.norm(middles[:, None] - middles, axis=-1)
-    near = np.argsort(apart, axis=1, kind="stable")[:, 1 : NEIGHBOURS + 1]
+    near = np.argsort(apart, axis=1, kind="stable")[:, 1 : NEIGHBOUR_COUNT + 1]
     sides = np.linalg.norm(markers.corners[:, 0] - markers.corners[:, 2], axis=-1) / np.sqrt(2.0)
     linked = np.eye(count, dtype=bool)
     for i in range(count):
@@ -87,7 +90,7 @@ def of_one_board(markers: Markers, plane: Float[ndarray, "n 4 2"]) -> Bool[ndarr
             -1, 4, 2
         )
         off = np.linalg.norm(foreseen - markers.corners[near[i]], axis=-1).max(1)
-        fits = (off < LOOSE * sides[near[i]]) & (apart[i, near[i]] > 0)
+        fits = (off < LOOSE_SHARE * sides[near[i]]) & (apart[i, near[i]] > 0)
         linked[i, near[i][fits]] = linked[near[i][fits], i] = True
     return _largest(linked)
 

@@ -28,7 +28,7 @@ DETECTORS: dict[str, Callable[[ndarray, Any], Sight | Unseen]] = {
 
 
 def see(grey: ndarray, target: Target) -> Sight | Unseen:
-    """The target's corners in one photograph, (h,w) uint8."""
+    """The corners of a single target in one photograph, (h,w) uint8."""
     return DETECTORS[target.kind](grey, target.board)
 
 
@@ -38,7 +38,9 @@ def check_can_be_seen(target: Target) -> None:
     Raises:
         InputError: no detector knows its kind.
     """
-    if target.kind not in DETECTORS:
+    for member in target.members:
+        check_can_be_seen(member)
+    if not target.members and target.kind not in DETECTORS:
         raise InputError(
             f"target {target.name!r} cannot be looked for in photographs; expected one of"
             f" {', '.join(DETECTORS)}. Hand in corners instead."

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -19,21 +18,23 @@ from orthoscope.evaluation.camera_error import CameraError
 from orthoscope.evaluation.coverage import share_covered
 from orthoscope.evaluation.disagreement import AGREED, Disagreement, disagreement
 from orthoscope.evaluation.groups import Groups, two_groups
-from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
+from orthoscope.evaluation.metrics import nce_of
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit, reference_fit
 from orthoscope.evaluation.suspects import ViewError
+from orthoscope.evaluation.unseen_views import USUAL_FOLDS, in_folds, in_turn
 from orthoscope.evaluation.verdict.facts import Findings, situation_of
 from orthoscope.evaluation.verdict.situation import NOTHING_KNOWN, Situation
 from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
-from orthoscope.fitting.held_out import HeldOut, held_out
+from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
-from orthoscope.methods import METHODS, check_settings
+from orthoscope.methods import check_settings
+from orthoscope.methods.decoupled.fits import fits_of
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
@@ -63,6 +64,7 @@ class Evaluation:
         disagreement: whether the photographs agree on one camera (disagreement.py).
         groups: of photographs of two cameras; None where there is one.
         situation: the facts that the verdict is made from.
+        folds: in how many parts the views were held out; 0 for each photograph in its turn.
     """
 
     calibration: Calibration
@@ -83,6 +85,7 @@ class Evaluation:
     disagreement: Disagreement = AGREED
     groups: Groups | None = None
     situation: Situation = NOTHING_KNOWN
+    folds: int = 0
 
     def trusted(self, pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
         """Which places of the image lie where the camera may be used; none where nothing tells how far off it
@@ -125,12 +128,7 @@ def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | 
         used = at_disc_centres(used, camera, poses, [view.image for view in used.views], shape=shape)
         poses = resect(camera, used, shape=shape)
     residuals = residuals_of(camera, poses, used, shape=shape)
-    estimated, observed = lateral_errors(camera, poses, used, shape=shape)
-    nce = (
-        normalised_calibration_error(estimated, observed, camera.intrinsics)
-        if len(observed)
-        else float("nan")
-    )
+    nce = nce_of(camera, poses, used, shape=shape)
     return UnseenError(used, rms(np.concatenate(residuals)), tuple(rms(e) for e in residuals), nce)
 
 
@@ -138,26 +136,33 @@ def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | 
 def evaluate(
     calibration: Calibration,
     *,
-    folds: int = 5,
+    folds: int | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
     """Judge a calibration by photographs it has not seen, by its residuals and by what its views cover.
 
-    folds: of views; the calibration's own method is called again on each (docs/conventions.md). executor,
-    progress: as in `held_out`. Raises InputError where the calibration's method or a setting is none.
+    Args:
+        calibration: of any method.
+        folds: of views, the calibration's own method called again without each; by default each photograph is
+            left out in its turn by one linear step, where the method has one, and there are five folds where
+            not (unseen_views.py).
+        executor, progress: of the folds, as in `held_out`.
+    Raises:
+        InputError: the calibration's method or a setting is none, or folds are fewer than two.
     """
     check_settings(calibration.method, calibration.settings)
-    detections = calibration.detections
-    refit = partial(METHODS[calibration.method], **calibration.settings)
-    unseen = held_out(detections, refit, folds=folds, executor=executor, progress=progress)
-    residuals = calibration.residuals()
+    fits, residuals = fits_of(calibration), calibration.residuals()
+    if folds is None and fits.own is not None:
+        unseen = in_turn(calibration, fits.own.left_out)
+    else:
+        unseen = in_folds(calibration, folds or USUAL_FOLDS, executor=executor, progress=progress)
     sizes = np.concatenate([np.hypot(*e.T) for e in residuals])
     views = tuple(
         ViewError(view.image, len(view.ids), rms(e), rms(e_unseen))
-        for view, e, e_unseen in zip(detections.views, residuals, unseen.residuals, strict=True)
+        for view, e, e_unseen in zip(calibration.detections.views, residuals, unseen.residuals, strict=True)
     )
-    found = examine(calibration, views)
+    found = _findings(calibration, fits, views)
     situation = situation_of(found)
     return Evaluation(
         calibration=calibration,
@@ -165,8 +170,8 @@ def evaluate(
         median_px=float(np.median(sizes)),
         largest_px=float(sizes.max()),
         held_out_rms_px=unseen.rms_px,
-        held_out_error_px=unseen.standard_error_px,
-        nce=_nce(calibration, unseen),
+        held_out_error_px=unseen.error_px,
+        nce=_trained_nce(calibration) if math.isnan(unseen.nce) else unseen.nce,
         misfit=found.misfit,
         coverage=share_covered(calibration),
         views=views,
@@ -178,20 +183,20 @@ def evaluate(
         disagreement=replace(found.disagreement, wishes=None),
         groups=found.groups,
         situation=situation,
+        folds=unseen.folds,
     )
 
 
-def examine(calibration: Calibration, views: tuple[ViewError, ...] | None = None) -> Findings:
-    """What tests find out about a calibration; no photograph is held out.
+def examine(calibration: Calibration) -> Findings:
+    """What tests find out about a calibration, whatever was held out."""
+    nothing = float("nan")
+    pairs = zip(calibration.detections.views, calibration.residuals(), strict=True)
+    views = tuple(ViewError(view.image, len(view.ids), rms(e), nothing) for view, e in pairs)
+    return _findings(calibration, fits_of(calibration), views)
 
-    Args:
-        views: what each photograph's error is, where that is known; found out where not.
-    """
-    if views is None:
-        nothing = float("nan")
-        pairs = zip(calibration.detections.views, calibration.residuals(), strict=True)
-        views = tuple(ViewError(view.image, len(view.ids), rms(e), nothing) for view, e in pairs)
-    reference = reference_fit(calibration)
+
+def _findings(calibration: Calibration, fits: Fits, views: tuple[ViewError, ...]) -> Findings:
+    reference = reference_fit(calibration, fits)
     differ, groups = _agreement(reference, calibration.detections)
     return Findings(calibration, views, misfit(calibration), reference, differ, groups)
 
@@ -206,16 +211,11 @@ def _agreement(reference: ReferenceFit | None, detections: Detections) -> tuple[
     return found, two_groups(reference.known, found, reference.left_out, detections, base=reference.base)
 
 
-def _nce(calibration: Calibration, unseen: HeldOut) -> float:
-    """NCE over the views that were held out; over the training views where none was."""
-    detections = calibration.detections
-    if not math.isnan(nce := held_out_nce(unseen, detections)):
-        return nce
-    estimated, observed = lateral_errors(
-        calibration.camera, calibration.camera_from_target, detections, shape=calibration.target_shape
-    )
-    return (
-        normalised_calibration_error(estimated, observed, calibration.camera.intrinsics)
-        if len(observed)
-        else float("nan")
+def _trained_nce(calibration: Calibration) -> float:
+    """NCE over the views that the calibration was made from."""
+    return nce_of(
+        calibration.camera,
+        calibration.camera_from_target,
+        calibration.detections,
+        shape=calibration.target_shape,
     )

@@ -10,11 +10,11 @@ from orthoscope.fitting.calibration import points_of
 from orthoscope.fitting.held_out import HeldOut
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import WIDEST, Camera, Intrinsics
+from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
-__all__ = ["held_out_nce", "lateral_errors", "normalised_calibration_error"]
+__all__ = ["held_out_nce", "lateral_errors", "nce_of", "normalised_calibration_error"]
 
 
 def normalised_calibration_error(
@@ -52,8 +52,8 @@ def lateral_errors(
 ) -> tuple[ndarray, ndarray]:
     """Points as back-projected from the detected pixels and as the poses place them, for NCE.
 
-    Corners that no straight image would hold (WIDEST), or whose pixel no ray reaches, are left out: towards
-    90 degrees a lateral error grows without end.
+    Corners that no straight image would hold (WIDEST_ANGLE), or whose pixel no ray reaches, are left out:
+    towards 90 degrees a lateral error grows without end.
 
     Args:
         camera: gives the rays.
@@ -71,11 +71,28 @@ def lateral_errors(
         ]
     )
     rays = camera.unproject(np.concatenate([view.pixels for view in detections.views]))
-    usable = (rays[:, 2] > np.cos(WIDEST)) & (
-        observed[:, 2] > np.cos(WIDEST) * np.sqrt((observed**2).sum(-1))
+    usable = (rays[:, 2] > np.cos(WIDEST_ANGLE)) & (
+        observed[:, 2] > np.cos(WIDEST_ANGLE) * np.sqrt((observed**2).sum(-1))
     )
     rays, observed = rays[usable], observed[usable]
     return rays * (observed[:, 2] / rays[:, 2])[:, None], observed
+
+
+def nce_of(
+    camera: Camera,
+    camera_from_target: Sequence[Pose],
+    detections: Detections,
+    *,
+    shape: TargetShape | None = None,
+) -> float:
+    """NCE of a camera at these poses; NaN where no straight image would hold any corner.
+
+    Arguments as in `lateral_errors`.
+    """
+    estimated, observed = lateral_errors(camera, camera_from_target, detections, shape=shape)
+    if not len(observed):
+        return float("nan")
+    return normalised_calibration_error(estimated, observed, camera.intrinsics)
 
 
 def held_out_nce(unseen: HeldOut, detections: Detections) -> float:

@@ -14,20 +14,17 @@ import numpy as np
 
 from orthoscope.evaluation.camera_error import CameraError, predicted_error, rms_difference, seen_places
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
+from orthoscope.fitting.fits import Fits
+from orthoscope.fitting.leave_one_out import LeaveOneOut
 from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.scatter import Scatter, scatter_of
-from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
-from orthoscope.methods.decoupled.candidates import PAIRS, Candidates, Model
-from orthoscope.methods.decoupled.step_one import FORMULA, fit_step_one
-from orthoscope.methods.decoupled.step_one_linearised import linearised
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import FREE, lens_name
+from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["ReferenceFit", "reference_fit"]
 
-AS_GOOD = 0.2  # of the error: a camera that is nearer to a fit of which all is known is that fit's
-FEWEST_VIEWS = 2  # with fewer, a free lens and a free target have nothing to be told by
+# A camera that is nearer to a fit of which all is known than this share of the error is that fit's.
+AS_GOOD_SHARE = 0.2
+# Methods whose own fit leaves views out: where it cannot, nothing is known of their camera.
+ONE_FIT = ("decoupled", "fccm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,66 +48,25 @@ class ReferenceFit:
     own_squares: Float[ndarray, " m"]
 
 
-def reference_fit(calibration: Calibration) -> ReferenceFit | None:
-    """The richest fit of a calibration's photographs; None where they do not tell one."""
-    detections, points = calibration.detections, calibration.detections.target.points
-    if len(detections.views) < FEWEST_VIEWS:
+def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
+    """The richest fit of a calibration's photographs; None where they do not tell one.
+
+    Args:
+        fits: of the calibration.
+    """
+    if fits.richest is None or (fits.own is None and calibration.method in ONE_FIT):
         return None
-    candidates = Candidates(detections, skew=bool(calibration.settings.get("skew", False)))
-    richest = Model(_base(calibration), "free", FREE)
-    try:
-        known, left_out = candidates.linearised(richest), candidates.left_out(richest)
-        of_richest = scatter_of(known, left_out, points)
-        own, without, within = _own(calibration, candidates, richest)
-    except (CalibrationError, np.linalg.LinAlgError):
-        return None
+    base, known, left_out, of_richest = fits.richest
+    scatter = fits.own.scatter if fits.own else of_richest
+    richest = None if scatter is of_richest else of_richest
+    detections = calibration.detections
     seen = seen_places(np.concatenate([view.pixels for view in detections.views]))
     distance = float(np.median([np.linalg.norm(pose.translation) for pose in calibration.camera_from_target]))
-    error = predicted_error(
-        own or of_richest, seen, distance=distance, richest=None if own is None else of_richest
-    )
-    apart = rms_difference(calibration.camera, (own or of_richest).camera, seen)
-    if apart > AS_GOOD * error.seen_px:
+    error = predicted_error(scatter, seen, distance=distance, richest=richest)
+    apart = rms_difference(calibration.camera, scatter.camera, seen)
+    if apart > AS_GOOD_SHARE * error.seen_px:
         # Not the minimum of a fit whose scatter is known: what is apart is its bias.
         error = replace(error, seen_px=float(np.hypot(error.seen_px, apart)), bias_px=apart)
-    return ReferenceFit(known, left_out, richest.base, error, without, within)
-
-
-def _base(calibration: Calibration) -> str:
-    """The formula to put the free lens on: the calibration's own base, or its formula with all its
-    coefficients.
-    """
-    if base := calibration.settings.get("base"):
-        return str(base)
-    lens = calibration.camera.lens
-    name = lens_name(lens.base if isinstance(lens, FreeLens) else lens)
-    return name if name in ("brown", "kannala_brandt", "rational") else "brown"
-
-
-def _own(
-    calibration: Calibration, candidates: Candidates, richest: Model
-) -> tuple[Scatter | None, Float[ndarray, " m"], Float[ndarray, " m"]]:
-    """Scatter of the calibration's own camera where it is not the richest fit's or not known, and the squares
-    of its views without and with them.
-    """
+    without = (fits.own.left_out**2).sum(1) if fits.own else left_out.squares
     within = np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
-    if calibration.method == "decoupled" and not _is(calibration, richest):
-        model = _model(calibration)
-        without = candidates.contender(model).squares
-        return candidates.scatter(model), without, within
-    if calibration.method == "fccm":
-        mine = linearised(fit_step_one(calibration, shape="flat", first_lens=FORMULA))
-        left_out = leave_one_out(mine)
-        return scatter_of(mine, left_out, calibration.detections.target.points), left_out.squares, within
-    return None, candidates.left_out(richest).squares, within
-
-
-def _model(calibration: Calibration) -> Model:
-    """What a calibration of the default method was made as."""
-    settings = calibration.settings
-    formula = settings["lens"] if settings["fit"] == PAIRS else None
-    return Model(settings["base"], settings["shape"], settings["first_lens"], formula)
-
-
-def _is(calibration: Calibration, richest: Model) -> bool:
-    return calibration.method == "decoupled" and _model(calibration) == richest
+    return ReferenceFit(known, left_out, base, error, without, within)

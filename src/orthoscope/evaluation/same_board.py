@@ -22,7 +22,8 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["SameBoard", "same_board"]
 
-SURELY = 2.0  # standard errors, over views
+# A gain of more than so many standard errors over views is hardly chance.
+SURE_ERRORS = 2.0
 
 
 class SameBoard(NamedTuple):
@@ -56,7 +57,7 @@ def same_board(camera: Camera, shape: TargetShape, detections: Detections) -> Sa
     error = float(np.sqrt(len(gained)) * gained.std(ddof=1)) if len(gained) > 1 else np.inf
     return SameBoard(
         same=bool(gained.sum() > 0.0),
-        sure=bool(abs(gained.sum()) > SURELY * error),
+        sure=bool(abs(gained.sum()) > SURE_ERRORS * error),
         learnt_px=float(np.sqrt(learnt.sum() / corners)),
         said_px=float(np.sqrt(said.sum() / corners)),
     )

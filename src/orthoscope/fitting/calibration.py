@@ -7,7 +7,7 @@ own.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,7 +118,8 @@ class Calibration:
     where the target's corners were found to be; flat where nothing is said. parameters: how many of camera
     and shape the data determined, a real number where priors shared in it. candidates: what else was tried,
     simplest first. free_camera: with the lens that no formula limits, where the camera's is a formula.
-    variances: that a fit with priors found and ended with. Raises InputError where poses and views, or the
+    variances: that a fit with priors found and ended with. kept: the fits that its method made, for
+    evaluation in the same process; neither saved nor sent. Raises InputError where poses and views, or the
     shape and the target, do not match in number.
     """
 
@@ -138,6 +139,10 @@ class Calibration:
     candidates: tuple[Candidate, ...] = ()
     free_camera: Camera | None = None
     variances: Variances | None = None
+    kept: Any = field(default=None, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"kept": None}
 
     def __post_init__(self) -> None:
         corners = len(self.detections.target.points)

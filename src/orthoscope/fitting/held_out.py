@@ -25,7 +25,8 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["FEWEST_VIEWS", "HeldOut", "folds_of_views", "held_out", "rms_and_error"]
 
-FEWEST_VIEWS = 4  # with fewer, a fold would leave a calibration that rests on assumptions
+# With fewer views a fold would leave a calibration that rests on assumptions.
+FEWEST_VIEWS = 4
 
 Refit = Callable[[Detections], Calibration]
 

@@ -29,7 +29,9 @@ from orthoscope.solve.least_squares import NormalEquations
 
 __all__ = ["Linearised", "ResidualSlopes"]
 
-ROUNDING = 1e-13  # of a scaled system: what is added to its diagonal before it is inverted
+# This is added to a scaled system's diagonal before it is inverted.
+ROUNDING_SHARE = 1e-13
+# A corner has so many coordinates.
 SPACE = 3
 
 
@@ -295,6 +297,6 @@ def _inverse(matrix: Float[ndarray, "s s"]) -> Float[ndarray, "s s"]:
     """Of a symmetric positive system, whatever its units."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix * scale * scale[:, None]
-    scaled[np.diag_indices_from(scaled)] += ROUNDING
+    scaled[np.diag_indices_from(scaled)] += ROUNDING_SHARE
     inverse = np.linalg.inv(scaled)
     return 0.5 * (inverse + inverse.T) * scale * scale[:, None]

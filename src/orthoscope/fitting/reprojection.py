@@ -24,6 +24,7 @@ from orthoscope.solve.losses import Loss
 
 __all__ = ["POSE", "Estimate", "Places", "Reprojection"]
 
+# A pose has so many parameters.
 POSE = 6
 
 

@@ -40,15 +40,15 @@ __all__ = [
     "with_skew",
 ]
 
-TOLD: dict[
-    str, Mapping[str, Any]
-] = {  # what a method need not find out: the simulated board is flat, and all tests are on flat boards
+# A method need not find out that the simulated board is flat, as in all tests.
+TOLD_SETTINGS: dict[str, Mapping[str, Any]] = {
     "decoupled": {"shape": "flat", "first_lens": "free"},
 }
 FCCM, NMLDC, MLDC = "FCCM", "NMLDC, plain", "MLDC, eq. (7)"
 REPEATED, NEAREST, REPAIRED = "MLDC, repeated", "MLDC, nearest", "NMLDC, repaired"
 FCCM5, OWN_CENTRE = "FCCM 5 parameters", "FCCM pfet, own centre"
-SEARCHED = 2  # trials in which eq. (7) is searched
+# Eq. (7) is searched in so many trials.
+SEARCHED_TRIALS = 2
 
 
 class PaperEntry(NamedTuple):
@@ -87,7 +87,7 @@ class PaperEntry(NamedTuple):
 PAPER = (
     PaperEntry(FCCM, "fccm", {"lens": "brown:k1,k2"}),
     PaperEntry(NMLDC, "nmldc", {"lens": "pfet:a1,a2,a3,a4", "measure": "straight-image"}),
-    PaperEntry(MLDC, "mldc", {"lens": "pfet", "correct": "literal"}, SEARCHED),
+    PaperEntry(MLDC, "mldc", {"lens": "pfet", "correct": "literal"}, SEARCHED_TRIALS),
 )
 OURS = (
     PaperEntry(REPEATED, "mldc", {"lens": "pfet"}),
@@ -101,13 +101,13 @@ OURS = (
 def fair_peers() -> tuple[PaperEntry, ...]:
     """Ours: the paper's methods as they can be made to work, and methods that the paper does not know."""
     others = sorted(set(METHODS) - {entry.method for entry in (*PAPER, *OURS)})
-    return (*OURS, *(PaperEntry(name, name, TOLD.get(name, {})) for name in others))
+    return (*OURS, *(PaperEntry(name, name, TOLD_SETTINGS.get(name, {})) for name in others))
 
 
 def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[PaperEntry, ...]:
     """Every method that takes a lens with every lens, the coefficients free that a user gets by naming it."""
     return tuple(
-        PaperEntry(f"{method} {lens}", method, {"lens": lens, **TOLD.get(method, {})})
+        PaperEntry(f"{method} {lens}", method, {"lens": lens, **TOLD_SETTINGS.get(method, {})})
         for method in METHODS
         if "lens" in settings_of(method)
         for lens in lenses

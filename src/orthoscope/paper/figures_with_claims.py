@@ -18,7 +18,7 @@ from orthoscope.paper.curves import Curves, curves_of
 from orthoscope.paper.entries import MLDC, PAPER
 from orthoscope.paper.photographs import STUDY as PHOTOGRAPHS
 from orthoscope.paper.photographs import obliqueness
-from orthoscope.paper.section4 import PAPERS_NOISE, SCENES, Results
+from orthoscope.paper.section4 import PAPER_NOISE_PX, SCENES, Results
 from orthoscope.paper.trials import Outcome
 from orthoscope.paper.wording import each_of
 
@@ -36,7 +36,8 @@ __all__ = [
     "without_noise",
 ]
 
-STEADY = 2.0  # px: a distortion centre that changes by less from trial to trial is a stable one
+# A distortion centre that changes by less, pixels, from trial to trial is a stable one.
+STEADY_PX = 2.0
 
 NOISE = Axis("noise levels", "{:g} px of noise", column="noise_px", label="sigma (px)")
 POINTS = Axis("numbers of points", "{:g} points", column="points", label="points a view")
@@ -238,7 +239,7 @@ def stable_centre(results: Results) -> tuple[Claim, ...]:
         if mldc is None or not np.isfinite(spread[MLDC]):
             said.append(Claim(where, paper, ClaimVerdict.OPEN, "Fewer than two trials gave a centre."))
             continue
-        verdict = ClaimVerdict.HOLDS if spread[MLDC] < STEADY else ClaimVerdict.FAILS
+        verdict = ClaimVerdict.HOLDS if spread[MLDC] < STEADY_PX else ClaimVerdict.FAILS
         finding = (
             f"Over {mldc.trials} trials its centre is at ({mldc.x[0]:.1f}, {mldc.y[0]:.1f}) px; standard"
             " deviations of the"
@@ -254,7 +255,7 @@ def fair_finding(results: Results) -> str:
     return claims_about_curves.fair_chance(
         curves,
         level=float(max(columns * rows for columns, rows in results.plan.points)),
-        noise_px=PAPERS_NOISE,
+        noise_px=PAPER_NOISE_PX,
     )
 
 

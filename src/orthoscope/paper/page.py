@@ -29,8 +29,8 @@ from orthoscope.paper.figures_with_claims import (
     stable_centre,
     without_noise,
 )
-from orthoscope.paper.photographs import SPLITS, Straightened
-from orthoscope.paper.section4 import PAPERS_NOISE, SCENES, Results
+from orthoscope.paper.photographs import SPLIT_COUNT, Straightened
+from orthoscope.paper.section4 import PAPER_NOISE_PX, SCENES, Results
 from orthoscope.paper.trials import TEST_VIEWS, TRAINING_VIEWS
 from orthoscope.version import __version__
 
@@ -39,8 +39,12 @@ if TYPE_CHECKING:
 
 __all__ = ["paper_page"]
 
+# The paper's gamma is told with so many decimals.
 GAMMA_DECIMALS = 3
-LEAST_HEIGHT, FOR_EACH_CLAIM = 2.6, 0.75  # inches: a figure is about as high as the claims beside it
+# A figure is at least this high, inches.
+LEAST_FIGURE_HEIGHT = 2.6
+# Each claim beside a figure makes it so much higher, inches, so that both are about as high.
+HEIGHT_PER_CLAIM = 0.75
 
 
 class Cell(NamedTuple):
@@ -63,8 +67,8 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         plan=results.plan,
         training_views=TRAINING_VIEWS,
         test_views=TEST_VIEWS,
-        splits=SPLITS,
-        noise=PAPERS_NOISE,
+        splits=SPLIT_COUNT,
+        noise=PAPER_NOISE_PX,
         headline=main_headline(every),
         every=every,
         summary=_summary(every),
@@ -116,7 +120,7 @@ def _figure(exhibit: FigureWithClaims) -> dict[str, Any]:
         exhibit.curves,
         level=kind.axis.label,
         even=kind.even,
-        height=LEAST_HEIGHT + FOR_EACH_CLAIM * len(exhibit.claims),
+        height=LEAST_FIGURE_HEIGHT + HEIGHT_PER_CLAIM * len(exhibit.claims),
     )
     return {
         "name": kind.name,
@@ -131,16 +135,16 @@ def _figure(exhibit: FigureWithClaims) -> dict[str, Any]:
 def _fig7(straightened: Straightened | None) -> dict[str, Any] | None:
     if straightened is None:
         return None
-    from orthoscope.report.pictures import LARGE, LARGE_BYTES, picture_uri
+    from orthoscope.report.pictures import BYTES_OF_LARGE, LARGE_WIDTH, picture_uri
 
     return {
         "name": straightened.name,
-        "photograph": picture_uri(straightened.photograph, LARGE, LARGE_BYTES),
+        "photograph": picture_uri(straightened.photograph, LARGE_WIDTH, BYTES_OF_LARGE),
         "pictures": [
             (
                 (name, None, picture)
                 if isinstance(picture, str)
-                else (name, picture_uri(picture, LARGE, LARGE_BYTES), "")
+                else (name, picture_uri(picture, LARGE_WIDTH, BYTES_OF_LARGE), "")
             )
             for name, picture in straightened.pictures
         ],

@@ -23,7 +23,7 @@ from orthoscope.straight.undistort import undistort
 from orthoscope.targets.detections import Detections
 
 __all__ = [
-    "SPLITS",
+    "SPLIT_COUNT",
     "STUDY",
     "Straightened",
     "check_views",
@@ -34,10 +34,12 @@ __all__ = [
     "straightened",
 ]
 
-SPLITS = 4  # 15 to compute and 5 to test of 20 is one in four
+# One photograph in so many is for testing, as the paper's 5 of 20.
+SPLIT_COUNT = 4
 STUDY = "photographs"
 REPEATED_ENTRY = next(entry for entry in OURS if entry.name == REPEATED)
-FEWEST_VIEWS = 8  # with fewer, a split tests on a single photograph
+# With fewer views a split tests on a single photograph.
+FEWEST_VIEWS = 8
 
 
 class Straightened(NamedTuple):
@@ -68,7 +70,7 @@ def grids_of(detections: Detections, count: int) -> tuple[tuple[int, int] | None
 
 def split(detections: Detections, turn: int) -> tuple[Detections, Detections]:
     """Training and test photographs: every fourth is for testing, a different one each turn."""
-    tested = np.arange(len(detections.views)) % SPLITS == SPLITS - 1 - turn
+    tested = np.arange(len(detections.views)) % SPLIT_COUNT == SPLIT_COUNT - 1 - turn
     return detections.only(np.flatnonzero(~tested)), detections.only(np.flatnonzero(tested))
 
 

@@ -18,18 +18,31 @@ from orthoscope.geometry.arrays import InputError
 from orthoscope.models.lenses import LENSES
 from orthoscope.paper.entries import PAPER, PaperEntry, every_lens, fair_peers
 from orthoscope.paper.eq7_searches import ALIKE, DAMPINGS, WEIGHTS, Eq7Search, member, rivals
-from orthoscope.paper.photographs import SPLITS, check_views, grids_of, split_outcomes
+from orthoscope.paper.photographs import SPLIT_COUNT, check_views, grids_of, split_outcomes
 from orthoscope.paper.subgrids import subgrids
 from orthoscope.paper.trials import TRAINING_VIEWS, Condition, Outcome, Study, trial_outcomes
 from orthoscope.simulation.scene import PAPER_FILL
 from orthoscope.targets.detections import Detections
 
-__all__ = ["BOARD", "ON_PHOTOGRAPHS", "PAPERS_NOISE", "PARTS", "SCENES", "Part", "Plan", "Results", "run"]
+__all__ = [
+    "ON_PHOTOGRAPHS",
+    "PAPER_BOARD",
+    "PAPER_NOISE_PX",
+    "PARTS",
+    "SCENES",
+    "Part",
+    "Plan",
+    "Results",
+    "run",
+]
 
 SCENES = ("low", "high")
-BOARD = (14, 20)  # inner corners of the paper's sheet
-PAPERS_NOISE = 0.1  # px; "some existing corner detection algorithms claim an accuracy of 0.1 pixels"
-GRIDS = 8
+# The paper's sheet has so many inner corners.
+PAPER_BOARD = (14, 20)
+# The paper says that "some existing corner detection algorithms claim an accuracy of 0.1 pixels".
+PAPER_NOISE_PX = 0.1
+# So many numbers of points are tried, each of them a part of the paper's sheet.
+GRID_COUNT = 8
 
 Progress = Callable[[int, int], None]
 
@@ -90,13 +103,13 @@ class Plan:
     seed: int = 0
     board: tuple[int, int] | None = None
     noise_px: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
-    points: tuple[tuple[int, int], ...] = subgrids(BOARD, GRIDS)
+    points: tuple[tuple[int, int], ...] = subgrids(PAPER_BOARD, GRID_COUNT)
     images: tuple[int, ...] = (1, 2, 3, 4, 5, 7, 10, 15)
     lenses: tuple[str, ...] = tuple(LENSES)
     dampings: tuple[tuple[str, float], ...] = DAMPINGS
     weights: tuple[tuple[float, float, float], ...] = WEIGHTS
-    eq7: Condition = Condition(PAPERS_NOISE)
-    grids: int = GRIDS
+    eq7: Condition = Condition(PAPER_NOISE_PX)
+    grids: int = GRID_COUNT
     most_table_trials: int = 5
     only: tuple[str, ...] = ()
     own: tuple[PaperEntry, ...] = ()
@@ -111,9 +124,10 @@ class Plan:
         if not self.noise_px or not all(0 <= sigma < np.inf for sigma in self.noise_px):
             raise InputError(f"noise levels are {self.noise_px}; expected pixels, 0 or more.")
         for columns, rows in self.points:
-            if not (3 <= columns <= BOARD[0] and 3 <= rows <= BOARD[1]):
+            if not (3 <= columns <= PAPER_BOARD[0] and 3 <= rows <= PAPER_BOARD[1]):
                 raise InputError(
-                    f"a sub-grid of {columns} x {rows} points; expected 3 x 3 to {BOARD[0]} x {BOARD[1]}."
+                    f"a sub-grid of {columns} x {rows} points; expected 3 x 3 to"
+                    f" {' x '.join(map(str, PAPER_BOARD))}."
                 )
         names = [entry.name for entry in self.everyone()]
         if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -130,7 +144,7 @@ class Plan:
             "images": (1, 4),
             "lenses": ("brown",),
             "dampings": (DAMPINGS[0], DAMPINGS[3]),
-            "eq7": Condition(PAPERS_NOISE, (5, 7), 5),
+            "eq7": Condition(PAPER_NOISE_PX, (5, 7), 5),
             "grids": 2,
             "most_table_trials": 1,
         }
@@ -147,7 +161,7 @@ class Plan:
 
     def condition(
         self,
-        noise_px: float = PAPERS_NOISE,
+        noise_px: float = PAPER_NOISE_PX,
         subgrid: tuple[int, int] | None = None,
         views: int = TRAINING_VIEWS,
     ) -> Condition:
@@ -176,7 +190,7 @@ class Plan:
             everyone,
         )
         exact = Study("exact", sizes[:1], (at(0.0, self.points[0]),), everyone)
-        lenses = Study("lenses", (PAPERS_NOISE,), (at(subgrid=self.board),), every_lens(self.lenses))
+        lenses = Study("lenses", (PAPER_NOISE_PX,), (at(subgrid=self.board),), every_lens(self.lenses))
         return (
             *((study, self.trials) for study in (noise, points, images)),
             *((study, self.table_trials) for study in (exact, lenses)),
@@ -245,7 +259,7 @@ def run(
                 grids=grids_of(detections, plan.grids),
                 entries=plan.everyone(),
             )
-            for turn in range(SPLITS)
+            for turn in range(SPLIT_COUNT)
         ]
         if detections and plan.wants(ON_PHOTOGRAPHS)
         else []

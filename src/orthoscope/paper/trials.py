@@ -48,9 +48,14 @@ __all__ = [
     "trial_outcomes",
 ]
 
-TRAINING_VIEWS, TEST_VIEWS = 15, 5
+# A trial calibrates from so many views, as in the paper.
+TRAINING_VIEWS = 15
+# A trial is tested on so many other views, as in the paper.
+TEST_VIEWS = 5
+# This stands for a figure that a trial does not have.
 NOWHERE = float("nan")
-UNSEEN = 0.01  # of the test corners; a camera without rays for more of them has failed
+# A camera without rays for more than this share of the test corners has failed.
+UNSEEN_SHARE = 0.01
 
 
 class Condition(NamedTuple):
@@ -232,7 +237,7 @@ def _unseen(camera: Camera, test: Detections) -> float:
     Raises CalibrationError where they are too many.
     """
     lost = np.isnan(camera.unproject(np.concatenate([view.pixels for view in test.views]))[:, 2])
-    if lost.mean() > UNSEEN:
+    if lost.mean() > UNSEEN_SHARE:
         raise CalibrationError(
             f"the camera has no ray for {int(lost.sum())} of {len(lost)} test corners. Use a lens that"
             " reaches over the image."

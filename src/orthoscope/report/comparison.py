@@ -50,6 +50,7 @@ NOTES = (
         "Rms is per point: the root of the mean of |e|², as OpenCV prints it. NCE, of held-out photographs: 1"
         " is what rounding to whole pixels alone would give."
     ),
+    "A camera's file stays as it is: it used none of these photographs; only the board's poses are fitted.",
     (
         "Parameters: how many of camera and target shape the data determined; not a whole number where priors"
         " shared in it. Lens, target: what it came to with all photographs; time, of that one calibration."

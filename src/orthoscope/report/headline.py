@@ -12,7 +12,8 @@ from orthoscope.evaluation.verdict.grades import Grade
 
 __all__ = ["Headline", "headline", "next_steps"]
 
-LOOKS = {  # of a grade: the class of its colours, and its sign
+# A grade has a class of colours and a sign.
+LOOKS = {
     Grade.GOOD: ("good", "\N{CHECK MARK}"),
     Grade.REGION: ("region", "\N{WHITE SQUARE}"),
     Grade.USABLE: ("usable", "\N{ALMOST EQUAL TO}"),

@@ -44,7 +44,8 @@ __all__ = [
     "warnings",
 ]
 
-ANGLES = ("tau_x", "tau_y", "w")  # coefficients in radians; all others have no unit
+# These coefficients are in radians; all others have no unit.
+ANGLE_NAMES = ("tau_x", "tau_y", "w")
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,9 @@ def parameters(calibration: Calibration) -> list[Parameter]:
     unused = _unused(calibration)
     coefficients = zip(camera.lens.names(), camera.lens.coefficients.tolist(), strict=True)
     rows += [
-        (name, value, "rad" if name in ANGLES else "") for name, value in coefficients if name not in unused
+        (name, value, "rad" if name in ANGLE_NAMES else "")
+        for name, value in coefficients
+        if name not in unused
     ]
     deviations = calibration.uncertainty.deviations
     return [
@@ -276,20 +279,11 @@ def lens_in_words(camera: Camera) -> str:
 def _held_out(evaluation: Evaluation) -> Card:
     if not np.isfinite(evaluation.held_out_rms_px):
         return Card("Error held out", ABSENT, "", "not done: no photograph could be kept back")
+    how = f"in {evaluation.folds} folds" if evaluation.folds else "each photograph left out in its turn"
     value, error = value_with_deviation(evaluation.held_out_rms_px, evaluation.held_out_error_px)
     if error == ABSENT:
-        return Card(
-            "Error held out",
-            pixels(evaluation.held_out_rms_px),
-            "px",
-            "rms per point on photographs that were not used",
-        )
-    return Card(
-        "Error held out",
-        value,
-        f"± {error} px",
-        "rms per point on photographs that were not used; ± one standard error",
-    )
+        return Card("Error held out", pixels(evaluation.held_out_rms_px), "px", f"rms per point, {how}")
+    return Card("Error held out", value, f"± {error} px", f"rms per point, {how}; ± one standard error")
 
 
 def _range(counts: list[int]) -> str:

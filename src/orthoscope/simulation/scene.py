@@ -126,7 +126,7 @@ def simulate_detections(
         scene.camera.image_size,
         tuple(views),
         tuple(empty),
-        disc_centres=scene.target.disc_radius > 0,
+        disc_centres=bool(scene.target.disc_radii.any()),
     )
 
 

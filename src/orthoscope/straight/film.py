@@ -34,8 +34,10 @@ CODECS = {
     ".mkv": "mp4v",
     ".avi": "MJPG",
 }  # what a film of that name is written with
-AHEAD = 6  # frames under way
-USUAL_RATE = 25.0  # frames a second of a film that does not say
+# So many frames are under way at most.
+FRAMES_AHEAD = 6
+# A film that does not say has so many frames a second.
+USUAL_RATE = 25.0
 
 
 def is_video(path: str | PathLike[str]) -> bool:
@@ -132,12 +134,12 @@ def _part_of(place: Path) -> Path:
 def _in_order(
     executor: Executor, step: Callable[[ndarray], ndarray], frames: Iterable[ndarray]
 ) -> Iterator[ndarray]:
-    """What `step` makes of each frame, in their order, with no more than AHEAD under way."""
+    """What `step` makes of each frame, in their order, with no more than FRAMES_AHEAD under way."""
     waiting: deque[Future[ndarray]] = deque()
     try:
         for frame in frames:
             waiting.append(executor.submit(step, frame))
-            if len(waiting) == AHEAD:
+            if len(waiting) == FRAMES_AHEAD:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()

@@ -31,7 +31,8 @@ from orthoscope.straight.views import View, map_of, straight_camera
 
 __all__ = ["Straightener", "before_and_after", "undistort", "undistort_photographs"]
 
-OUTSIDE = -10.0  # a place that is surely outside any photograph: remap paints it black
+# This place is surely outside any photograph: remap paints it black.
+OUTSIDE_PLACE = -10.0
 
 
 class _Spare(threading.local):
@@ -62,7 +63,7 @@ class Straightener:
         self.view: View = view or straight_camera(camera, keep=keep)
         self._spare = _Spare()
         self.maps: list[ndarray] = [
-            np.nan_to_num(part, copy=False, nan=OUTSIDE) for part in map_of(camera, self.view)
+            np.nan_to_num(part, copy=False, nan=OUTSIDE_PLACE) for part in map_of(camera, self.view)
         ]
 
     def __reduce__(self) -> tuple[Callable[[Camera], Straightener], tuple[Camera]]:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, ndarray
-from orthoscope.models.camera import WIDEST, Camera, Intrinsics, image_border
+from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics, image_border
 from orthoscope.models.lenses import Brown, KannalaBrandt, Stereographic
 from orthoscope.models.smooth_map import smooth_map
 
@@ -76,7 +76,7 @@ class Projection(NamedTuple):
 
 
 PROJECTIONS: dict[str, Projection] = {
-    "rectilinear": Projection(lambda size, pin_hole: Camera(size, pin_hole, Brown()), WIDEST),
+    "rectilinear": Projection(lambda size, pin_hole: Camera(size, pin_hole, Brown()), WIDEST_ANGLE),
     "equidistant": Projection(lambda size, pin_hole: Camera(size, pin_hole, KannalaBrandt()), np.pi),
     "stereographic": Projection(
         lambda size, pin_hole: Camera(size, pin_hole, Stereographic()), np.deg2rad(150.0)

@@ -73,6 +73,18 @@ class Board(ABC):
         Each is (m,): entry k is the id that corner k then has. No way where the board tells its ends apart.
         """
 
+    def mistaken_for(self, other: Board) -> bool:
+        """Whether a photograph of both boards may not tell which of them is which."""
+        mine, theirs = self.markers, other.markers
+        if mine and theirs:
+            return mine[0] == theirs[0] and not set(mine[1]).isdisjoint(theirs[1])
+        return self.kind == other.kind and sorted(self.grid) == sorted(other.grid)
+
+    @property
+    def markers(self) -> tuple[str, range] | None:
+        """The dictionary of its markers and their numbers in it; None where it has none."""
+        return None
+
     @property
     def disc_radius(self) -> float:
         """Radius of the discs whose centres the corners are, metres; 0 where they are points."""

@@ -12,7 +12,7 @@ from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.circles import Circles
 from orthoscope.targets.kalibr_target import kalibr_target
-from orthoscope.targets.target import Target, target_of
+from orthoscope.targets.target import TOGETHER, Target, several, target_of
 
 __all__ = ["TARGETS", "as_fields", "forms", "parse_target"]
 
@@ -27,9 +27,13 @@ def forms() -> str:
 def parse_target(text: str) -> Target:
     """The target of a description such as `chessboard:9x6:25mm`, or of Kalibr's target.yaml.
 
+    Args:
+        text: the description; of several targets in the same photographs all, with ` + ` between them.
     Raises:
-        InputError: the description is none.
+        InputError: the description is none, or two targets could be taken for each other.
     """
+    if TOGETHER in text:
+        return several([parse_target(one) for one in text.split(TOGETHER)])
     if text.strip().lower().endswith((".yaml", ".yml")):
         return target_of(kalibr_target(text.strip()))
     kind, *fields = text.strip().split(":")

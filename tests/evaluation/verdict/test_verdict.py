@@ -12,7 +12,7 @@ import pytest
 from orthoscope.cli.calibrate import calibrate
 from orthoscope.evaluation.verdict.advice import ADVICE, advice_on
 from orthoscope.evaluation.verdict.causes import CAUSES, listed
-from orthoscope.evaluation.verdict.grades import GRADES, WIDE, Grade, by_error, lower
+from orthoscope.evaluation.verdict.grades import GRADES, WIDE_SHARE, Grade, by_error, lower
 from orthoscope.evaluation.verdict.situation import FINE_PX, NOTHING_KNOWN, Situation, coarse_px
 from orthoscope.evaluation.verdict.verdict import verdict_on
 
@@ -169,7 +169,7 @@ def test_a_camera_that_is_said_to_hold_is_off_by_little():
             assert s.error_px <= FINE_PX
             assert f"less than {FINE_PX:g} px over" in verdict.far
         if verdict.grade == Grade.GOOD:
-            assert s.share >= WIDE
+            assert s.share >= WIDE_SHARE
 
 
 def test_nothing_known_is_not_to_be_used():

@@ -20,7 +20,8 @@ from orthoscope.models.parameters import INTRINSICS, Parameters
 
 __all__ = ["Slopes", "parameters_of", "slopes_of", "stepped"]
 
-OF_FRAME = ("frame_fx", "frame_fy", "centre_x", "centre_y")  # of a lens that has a frame of its own
+# These parameters belong to a lens that has a frame of its own.
+FRAME_NAMES = ("frame_fx", "frame_fy", "centre_x", "centre_y")
 
 
 class Slopes(NamedTuple):
@@ -90,7 +91,7 @@ def parameters_of(calibration: Calibration) -> tuple[str, ...]:
     camera, estimated = calibration.camera, calibration.uncertainty.deviations
     K = [name for name in INTRINSICS if name != "skew" or camera.intrinsics.skew or name in estimated]
     coefficients = [name for name, value in _coefficients(camera).items() if name in estimated or value]
-    return (*K, *coefficients, *(OF_FRAME if camera.lens_frame else ()))
+    return (*K, *coefficients, *(FRAME_NAMES if camera.lens_frame else ()))
 
 
 def stepped(camera: Camera, name: str, step: float) -> Camera:

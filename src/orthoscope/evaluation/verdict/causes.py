@@ -11,20 +11,29 @@ from collections.abc import Callable, Sequence
 from math import isnan
 from typing import NamedTuple
 
-from orthoscope.evaluation.verdict.grades import WIDE, Grade
+from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
 
 __all__ = ["CAUSES", "FEW_VIEWS", "Cause", "listed"]
 
-UNTOLD = 4  # photographs: with fewer, no error can be told
+# With fewer photographs no error can be told.
+FEWEST_PHOTOGRAPHS = 4
+# Fewer photographs than this are few.
 FEW_VIEWS = 8
-LEVEL = 12.0  # degrees: photographs with less tilt are all frontal
-NOTICED = 0.5  # of the corners' noise: cameras that differ by less are as good as one
+# Photographs with less tilt, degrees, are all frontal.
+LEVEL_DEGREES = 12.0
+# Cameras that differ by less than this share of the corners' noise are as good as one.
+NOTICED_SHARE = 0.5
+# Cameras that differ by less, pixels, are one camera for everyone.
 NEGLIGIBLE_PX = 0.05
-STIFF = 0.5  # of the corners' noise: what a free lens may miss
-WILD = 0.005  # of the corners: chance makes hardly any
-SPARSE = 0.75  # of the frame's cells: with corners in fewer, it is corners that are missing
-NAMED = 3  # images that a sentence lists
+# A free lens may miss up to this share of the corners' noise.
+STIFF_SHARE = 0.5
+# Chance makes hardly so large a share of the corners wild.
+WILD_SHARE = 0.005
+# With corners in less than this share of the frame's cells, it is corners that are missing.
+SPARSE_SHARE = 0.75
+# A sentence lists so many images.
+NAMED_IMAGES = 3
 
 
 class Cause(NamedTuple):
@@ -45,19 +54,19 @@ class Cause(NamedTuple):
 
 def listed(images: Sequence[str]) -> str:
     """`a, b and c`, or `a, b, c and 5 more`."""
-    shown = list(images[:NAMED])
-    if len(images) > NAMED:
-        return f"{', '.join(shown)} and {len(images) - NAMED} more"
+    shown = list(images[:NAMED_IMAGES])
+    if len(images) > NAMED_IMAGES:
+        return f"{', '.join(shown)} and {len(images) - NAMED_IMAGES} more"
     return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
 
 
 def _matters(s: Situation) -> bool:
-    return bool(s.disagree) and s.differ_px > max(NOTICED * s.noise_px, NEGLIGIBLE_PX)
+    return bool(s.disagree) and s.differ_px > max(NOTICED_SHARE * s.noise_px, NEGLIGIBLE_PX)
 
 
 def _lens_is_missed(s: Situation) -> bool:
     """A free lens is as stiff as its data made it, and misses a little of every lens by intent."""
-    return s.lens_px > (STIFF * s.noise_px if s.lens == "free" else 0.0)
+    return s.lens_px > (STIFF_SHARE * s.noise_px if s.lens == "free" else 0.0)
 
 
 def _of_photographs(s: Situation) -> Grade:
@@ -89,7 +98,7 @@ def _photographs(s: Situation) -> str:
 
 def _open(s: Situation) -> bool:
     """Whether the camera is not known well enough, and not for lack of corners in some part of the frame."""
-    return s.error_px > FINE_PX or (s.held < WIDE and s.covered >= SPARSE)
+    return s.error_px > FINE_PX or (s.held < WIDE_SHARE and s.covered >= SPARSE_SHARE)
 
 
 def _as_far_as_known(s: Situation) -> Grade:
@@ -104,7 +113,7 @@ def _as_far_as_it_goes(s: Situation) -> Grade:
 CAUSES: tuple[Cause, ...] = (
     Cause(
         "few",
-        lambda s: s.views < UNTOLD or isnan(s.error_px),
+        lambda s: s.views < FEWEST_PHOTOGRAPHS or isnan(s.error_px),
         lambda s: Grade.NO if s.views < 2 or isnan(s.error_px) else Grade.USABLE,
         lambda s: f"{_photograph(s.views)} cannot tell how far off it is",
     ),
@@ -118,7 +127,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "corners",
-        lambda s: s.wild > WILD * s.corners,
+        lambda s: s.wild > WILD_SHARE * s.corners,
         lambda s: Grade.USABLE,
         lambda s: f"{s.wild} of {s.corners} corners are far from where the others put them",
     ),
@@ -146,7 +155,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "tilt",
-        lambda s: _open(s) and s.tilt < LEVEL,
+        lambda s: _open(s) and s.tilt < LEVEL_DEGREES,
         _as_far_as_known,
         lambda s: "the target faced the camera in all photographs, so its focal length is open",
     ),
@@ -169,7 +178,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "region",
-        lambda s: s.held < WIDE,
+        lambda s: s.held < WIDE_SHARE,
         lambda s: Grade.REGION,
         lambda s: f"too few corners were seen {s.place}",
     ),

@@ -13,7 +13,7 @@ from orthoscope.evaluation.misfit.f_test import is_misfit
 from orthoscope.evaluation.misfit.misfit import Misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit
 from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
-from orthoscope.evaluation.verdict.situation import FINE_PX, Situation, coarse_px
+from orthoscope.evaluation.verdict.situation import FINE_PX, USUAL_WIDTH, Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.solve.least_squares import Status
@@ -21,11 +21,13 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Findings", "corners_beyond", "distinct_views", "share_within", "situation_of"]
 
-# in an image of 1000 pixels: views whose corners are apart by less (median) are the same photograph again
+# Views whose corners are apart by less (median, pixels in an image of 1000) are the same photograph again.
 COPIED_PX = 1.0
-USUAL_WIDTH = 1000.0
-DISTINCT = 0.7  # of the views: with more copies among them, that they agree says nothing
-WILD = 12.0  # times the median residual: farther off than heavy tails reach
+# With no more than this share of the views left without copies, that they agree says nothing.
+DISTINCT_SHARE = 0.7
+# A residual of more than this many times the median is farther off than heavy tails reach.
+WILD_FACTOR = 12.0
+# No residual below this, pixels, is called wild.
 WILD_PX = 0.5
 
 
@@ -49,7 +51,7 @@ def situation_of(found: Findings) -> Situation:
     images = [view.image for view in detections.views]
     known = reference.known if reference else None
     suspects = suspects_among(found.views, known, detections.target.points)
-    told = distinct > DISTINCT * views  # copies agree with each other whatever is true
+    told = distinct > DISTINCT_SHARE * views  # copies agree with each other whatever is true
     return Situation(
         method=calibration.method,
         lens=str(settings.get("lens", "")),
@@ -135,7 +137,7 @@ def _error(reference: ReferenceFit | None, disagreement: Disagreement, copies: f
 def _wild(calibration: Calibration, suspects: set[str]) -> int:
     """How many corners are far from where the others put them, photographs that do not belong left aside."""
     sizes = [np.hypot(*e.T) for e in calibration.residuals()]
-    limit = max(WILD * float(np.median(np.concatenate(sizes))), WILD_PX)
+    limit = max(WILD_FACTOR * float(np.median(np.concatenate(sizes))), WILD_PX)
     views = calibration.detections.views
     return sum(
         int((size > limit).sum())

@@ -13,9 +13,11 @@ from typing import NamedTuple
 
 from orthoscope.evaluation.verdict.situation import COARSE_PX, FINE_PX, Situation
 
-__all__ = ["GRADES", "WIDE", "Grade", "by_error", "lower"]
+__all__ = ["GRADES", "WIDE_SHARE", "Grade", "by_error", "lower"]
 
-WIDE = 0.7  # of the frame: what is left is corners of it that a board rarely reaches
+# A camera holds widely over this share of the frame; what is left is corners of it that a board rarely
+# reaches.
+WIDE_SHARE = 0.7
 
 
 class Grade(StrEnum):
@@ -36,8 +38,9 @@ class _Row(NamedTuple):
 GRADES: tuple[_Row, ...] = (
     _Row(
         Grade.GOOD,
-        f"off by {FINE_PX:g} px at most where corners were seen: {100 * WIDE:.0f} % of the frame or more",
-        lambda s: s.error_px <= FINE_PX and s.held >= WIDE,
+        f"off by {FINE_PX:g} px at most where corners were seen: {100 * WIDE_SHARE:.0f} % of the frame or"
+        " more",
+        lambda s: s.error_px <= FINE_PX and s.held >= WIDE_SHARE,
     ),
     _Row(
         Grade.REGION,

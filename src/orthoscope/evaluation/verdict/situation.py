@@ -7,10 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["COARSE_PX", "FINE_PX", "NOTHING_KNOWN", "Situation", "coarse_px"]
+__all__ = ["COARSE_PX", "FINE_PX", "NOTHING_KNOWN", "USUAL_WIDTH", "Situation", "coarse_px"]
 
-FINE_PX = 0.5  # a camera that is off by no more serves everyone: corners are found to about that
-COARSE_PX = 3.0  # in an image of 1000 pixels: a camera that is off by more serves nobody
+# A camera that is off by no more, pixels, serves everyone: corners are found to about that.
+FINE_PX = 0.5
+# A camera that is off by more, pixels in an image of 1000, serves nobody.
+COARSE_PX = 3.0
+# Limits in pixels are meant for an image of this width, and grow with a larger one.
 USUAL_WIDTH = 1000.0
 
 

@@ -2,7 +2,8 @@
 
 The calibration itself stands in its own file; the camera is told again so that the two can be seen to belong
 together, and so that a program that reads this file alone knows what was judged. Held-out residuals are a row
-[x, y] for each corner, in the order of the calibration's views and their corners.
+[x, y] for each corner, in the order of the calibration's views and their corners; folds is in how many parts
+the views were held out, 0 for each in its turn, and five where an earlier file does not say.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from orthoscope.evaluation.groups import Groups
 from orthoscope.evaluation.misfit.f_test import MisfitTest
 from orthoscope.evaluation.misfit.misfit import LensMisfit, Misfit, TargetMisfit
 from orthoscope.evaluation.suspects import ViewError
+from orthoscope.evaluation.unseen_views import USUAL_FOLDS
 from orthoscope.evaluation.verdict.situation import Situation
 from orthoscope.evaluation.verdict.verdict import verdict_on
 from orthoscope.fitting.calibration import Calibration
@@ -208,6 +210,7 @@ class EvaluationFile(FileStruct, kw_only=True):
     target_misfit: TargetMisfitFile
     lens_misfit: LensMisfitFile
     held_out_residuals: list[list[list[Number]]]
+    folds: int = USUAL_FOLDS
 
     @classmethod
     def of(cls, evaluation: Evaluation) -> EvaluationFile:
@@ -227,7 +230,8 @@ class EvaluationFile(FileStruct, kw_only=True):
             error=CameraErrorFile.of(evaluation.error) if evaluation.error else None,
             disagreement=DisagreementFile.of(evaluation.disagreement),
             groups=GroupsFile.of(evaluation.groups) if evaluation.groups else None,
-            **{name: null_for_nan(getattr(evaluation, name)) for name in NUMBERS},
+            folds=evaluation.folds,
+            **{name: null_for_nan(getattr(evaluation, name)) for name in NUMBER_FIELDS},
         )
 
     def core(self, calibration: Calibration) -> Evaluation:
@@ -246,7 +250,8 @@ class EvaluationFile(FileStruct, kw_only=True):
             raise InputError(f"it has not {len(self.views)} tables of held-out residuals, one for each view")
         situation = self.situation.core()
         numbers: dict[str, Any] = {
-            name: float("nan") if getattr(self, name) is None else getattr(self, name) for name in NUMBERS
+            name: float("nan") if getattr(self, name) is None else getattr(self, name)
+            for name in NUMBER_FIELDS
         }
         return Evaluation(
             calibration=calibration,
@@ -263,10 +268,10 @@ class EvaluationFile(FileStruct, kw_only=True):
             disagreement=self.disagreement.core(),
             groups=self.groups.core() if self.groups else None,
             situation=situation,
+            folds=self.folds,
             **numbers,
         )
 
 
-NUMBERS = tuple(  # the fields that are one number each, here and in the core
-    name for name, kind in EvaluationFile.__annotations__.items() if kind == "Number"
-)
+# These fields are one number each, here and in the core.
+NUMBER_FIELDS = tuple(name for name, kind in EvaluationFile.__annotations__.items() if kind == "Number")

@@ -31,7 +31,7 @@ from orthoscope.targets.board import Board
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.detections import Detections, Outlier, SetAside, View
 from orthoscope.targets.table import TARGETS, as_fields
-from orthoscope.targets.target import Target
+from orthoscope.targets.target import Target, several
 
 __all__ = ["CalibrationFile", "CameraFile", "DetectionsFile", "SceneFile"]
 
@@ -44,16 +44,24 @@ class TargetFile(FileStruct, kw_only=True):
     points: list[tuple[float, float, float]]
     lines: list[list[int]] = []
     board: dict[str, Any] | None = None  # a chessboard is known by its grid
+    members: list[TargetFile] = []  # of several targets; points and lines then follow from theirs
 
     @classmethod
     def of(cls, target: Target) -> TargetFile:
         lines = [line.tolist() for line in target.lines]
         board = None if target.board is None or target.kind == Chessboard.kind else as_fields(target.board)
         return cls(
-            name=target.name, grid=target.grid, points=target.points.tolist(), lines=lines, board=board
+            name=target.name,
+            grid=target.grid,
+            points=target.points.tolist(),
+            lines=lines,
+            board=board,
+            members=[cls.of(member) for member in target.members],
         )
 
     def core(self) -> Target:
+        if self.members:
+            return several([member.core() for member in self.members])
         points = np.array(self.points, dtype=float).reshape(-1, 3)
         lines = tuple(np.array(line, dtype=np.int64) for line in self.lines)
         return Target(self.name, points, lines, self.grid, _board(self.board) if self.board else None)

@@ -19,7 +19,7 @@ from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.scatter import Scatter, scatter_of
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
-from orthoscope.methods.decoupled.model_selection import NOTHING, Contender
+from orthoscope.methods.decoupled.model_selection import NEGLIGIBLE_SQUARE, Contender
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.decoupled.step_two import formula_from_pairs
@@ -72,17 +72,33 @@ class Candidates:
         self.detections, self._skew = detections, skew
         self.flat, self.step_one = cache(self._flat), cache(self._step_one)
         self.linearised, self.left_out = cache(self._linearised), cache(self._left_out)
-        self.from_pairs = cache(self._from_pairs)
+        self.from_pairs, self.scatter = cache(self._from_pairs), cache(self._scatter)
 
     def contender(self, model: Model) -> Contender:
         """The model with its squared held-out residuals; NaN in views where the others cannot tell, or in all
         where it cannot be fitted.
         """
         try:
-            squares = self._squares(model)
+            squares = (self.residuals(model) ** 2).sum(1)
         except CalibrationError:
             squares = np.full(len(self.detections.views), np.nan)
         return Contender(model.base, model.shape, model.lens, model.fit, squares)
+
+    def residuals(self, model: Model) -> Float[ndarray, "m n"]:
+        """Of each view by the model without it, as in `LeaveOneOut`.
+
+        Raises CalibrationError where the model cannot be fitted.
+        """
+        if model.formula:
+            return self.from_pairs(model).residuals
+        fit = self.linearised(model)
+        # Without noise nothing holds back what one view alone decides, and nothing has to: it is exact.
+        return fit.errors if fit.noise < NEGLIGIBLE_SQUARE else self.left_out(model).residuals
+
+    def fits(self, calibration: Calibration) -> bool:
+        """Whether these are the fits of a calibration's own photographs."""
+        same = calibration.detections is self.detections
+        return same and bool(calibration.settings.get("skew", False)) == self._skew
 
     def camera(self, model: Model) -> tuple[Camera, tuple[str, ...]]:
         """The model's camera, and the names of its parameters that were fitted.
@@ -96,19 +112,6 @@ class Candidates:
             else (fit.estimate.camera, fit.problem.free)
         )
 
-    def scatter(self, model: Model) -> Scatter:
-        """How the model's camera scatters."""
-        if model.formula:
-            return self.from_pairs(model).scatter()
-        return scatter_of(self.linearised(model), self.left_out(model), self.detections.target.points)
-
-    def _squares(self, model: Model) -> Float[ndarray, " m"]:
-        if model.formula:
-            return self.from_pairs(model).squares
-        fit = self.linearised(model)
-        # Without noise nothing holds back what one view alone decides, and nothing has to: it is exact.
-        return (fit.errors**2).sum(1) if fit.noise < NOTHING else self.left_out(model).squares
-
     def _flat(self, base: str) -> Calibration:
         return fit_flat(self.detections, lens=base, skew=self._skew)
 
@@ -120,6 +123,12 @@ class Candidates:
 
     def _left_out(self, model: Model) -> LeaveOneOut:
         return leave_one_out(self.linearised(model))
+
+    def _scatter(self, model: Model) -> Scatter:
+        """How the model's camera scatters."""
+        if model.formula:
+            return self.from_pairs(model).scatter()
+        return scatter_of(self.linearised(model), self.left_out(model), self.detections.target.points)
 
     def _from_pairs(self, model: Model) -> PairsLeftOut:
         first = model.step_one

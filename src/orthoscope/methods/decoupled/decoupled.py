@@ -46,7 +46,8 @@ from orthoscope.version import __version__
 __all__ = ["BASES", "decoupled"]
 
 AUTO = "auto"
-BASES = ("brown", "kannala_brandt", "rational")  # in order of preference
+# These are the base formulas, in order of preference.
+BASES = ("brown", "kannala_brandt", "rational")
 TOO_FEW = (
     f"fewer than {FEWEST_VIEWS} views cannot be judged by views that were not used; where nothing else was"
     " asked for, the target is taken to be as it is said to be, and the lens to follow its formula"
@@ -261,4 +262,5 @@ def _calibration(
         candidates=told,
         free_camera=fit.estimate.camera if model.first_lens == FREE and model.formula else None,
         variances=fit.evidence.variances,
+        kept=candidates,
     )

@@ -30,6 +30,7 @@ from orthoscope.solve.losses import Linear, Loss
 
 __all__ = ["MeasurementSums", "Measurements", "spline_unknowns"]
 
+# A corner has so many coordinates.
 SPACE = 3
 
 

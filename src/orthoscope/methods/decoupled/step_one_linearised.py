@@ -1,5 +1,5 @@
-"""A fit of step 1 as linear algebra, for whoever asks what its views say one by one
-(fitting/linearised.py).
+"""A fit of step 1, or a full calibration of a flat target, as linear algebra, for whoever asks what its views
+say one by one (fitting/linearised.py).
 """
 
 from __future__ import annotations
@@ -8,18 +8,55 @@ from dataclasses import replace
 
 import numpy as np
 
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.reprojection import POSE
 from orthoscope.fitting.residual_slopes import residual_slopes
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
+from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Precisions
 from orthoscope.methods.decoupled.step_one import StepOneFit
-from orthoscope.solve.losses import Loss
+from orthoscope.solve.losses import LOSSES, Loss
 
-__all__ = ["linearised", "roots_of"]
+__all__ = ["linearised", "linearised_flat", "roots_of"]
 
 
 def linearised(fit: StepOneFit) -> Linearised:
     """The fit at its estimate, with the weights of loss and priors that it ended with."""
-    problem, estimate, loss = fit.problem, fit.estimate, fit.loss
+    return _linearised(fit.problem, fit.estimate, fit.loss, fit.evidence.noise)
+
+
+def linearised_flat(calibration: Calibration) -> Linearised:
+    """A calibration by `fccm` where it ended, with its own loss: nothing is fitted.
+
+    The noise is the cost over what poses and camera left free.
+    """
+    detections, settings = calibration.detections, calibration.settings
+    free, corners = calibration.uncertainty.names, len(detections.target.points)
+    loss = LOSSES[settings["loss"]](settings["loss_scale"])
+    observations = Observations.by_corner(detections)
+    problem = Joint(
+        Measurements(observations, calibration.camera, free, corners_move=False),
+        detections.target.points,
+        free,
+        surface=np.zeros((corners, 0)),
+        energy=np.zeros((0, 0)),
+        single=False,
+        precisions=Precisions(np.zeros((0, SPACE)), np.zeros(SPACE), 0.0),
+    )
+    estimate = DecoupledEstimate(
+        calibration.camera,
+        observations.poses_of(calibration.camera_from_target),
+        np.zeros((0, SPACE)),
+        np.zeros((corners, SPACE)),
+    )
+    freedom = 2 * detections.corners - POSE * len(detections.views) - len(free)
+    noise = problem.linearise(estimate, loss).cost / max(freedom, 1)
+    return _linearised(problem, estimate, loss, noise)
+
+
+def _linearised(problem: Joint, estimate: DecoupledEstimate, loss: Loss, noise: float) -> Linearised:
     observations, points = problem.measurements.observations, problem.corners(estimate)
     moves = problem.single or problem.surface.shape[1] > 0
     slopes, residual = residual_slopes(
@@ -37,7 +74,7 @@ def linearised(fit: StepOneFit) -> Linearised:
         shape_precision=np.concatenate(
             [surface.ravel(), np.tile(singles, len(points)) if problem.single else np.empty(0)]
         ),
-        noise=fit.evidence.noise,
+        noise=noise,
         normal=problem.linearise(estimate, loss),
         by_corner=problem.by_corner,
     )

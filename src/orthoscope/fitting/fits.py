@@ -1,0 +1,52 @@
+"""What a calibration's fits say of it beyond the camera: how it scatters, and what leaving each photograph
+out does.
+
+A method that compares models has all this at hand when it ends (methods/decoupled/candidates.py); evaluation
+asks for it, and it is not saved.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from orthoscope.fitting.leave_one_out import LeaveOneOut
+from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.scatter import Scatter
+from orthoscope.geometry.arrays import Float, ndarray
+
+__all__ = ["Fits", "OwnFit", "RichestFit"]
+
+
+class OwnFit(NamedTuple):
+    """The calibration's own model.
+
+    Args:
+        left_out: (m,2p) residuals of each view by the fit without it, as in `LeaveOneOut`.
+        scatter: of its camera.
+    """
+
+    left_out: Float[ndarray, "m n"]
+    scatter: Scatter
+
+
+class RichestFit(NamedTuple):
+    """Every corner free and a free lens.
+
+    Args:
+        base: the formula under the free lens.
+        known: the fit, linearised.
+        left_out: each view left out of it.
+        scatter: of its camera.
+    """
+
+    base: str
+    known: Linearised
+    left_out: LeaveOneOut
+    scatter: Scatter
+
+
+class Fits(NamedTuple):
+    """Both; None where the photographs do not tell one, or the method has no such fit."""
+
+    own: OwnFit | None
+    richest: RichestFit | None
