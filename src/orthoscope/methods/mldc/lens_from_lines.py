@@ -118,6 +118,7 @@ def lens_of_lines(
     measure: str,
     loss: Loss,
     options: Options,
+    centre: bool = True,
 ) -> StraightLens:
     """The same for lines of any kind.
 
@@ -129,6 +130,7 @@ def lens_of_lines(
         measure: of MEASURES, where distances are measured.
         loss: how large errors count.
         options: of the solver.
+        centre: whether the lens has a centre of its own; it stands at the image's else.
     Raises:
         CalibrationError: as `fit_straight_lens`.
     """
@@ -137,6 +139,7 @@ def lens_of_lines(
         return problem_of(tuple(OWN_NAMES.get(name, name) for name in free))
 
     free = straightened_parameters(lens, coefficients)
+    free = free if centre else tuple(name for name in free if name not in CENTRE)
     shape = tuple(name for name in free if name not in CENTRE)
     starts = _likeliest(problem(free), image_size, lens)
     straight = _result(
