@@ -37,7 +37,7 @@ NEIGHBOUR_COUNT = 6
 class Markers(NamedTuple):
     """Markers that were found.
 
-    Args:
+    Attributes:
         numbers: (n,) their numbers in the dictionary.
         corners: (n,4,2) pixels, the marker's own top left, then clockwise.
     """

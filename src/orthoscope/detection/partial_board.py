@@ -47,7 +47,7 @@ COMPARED_LINES = 4
 class Grid(NamedTuple):
     """A lattice as a grid.
 
-    Args:
+    Attributes:
         corners: (rows, columns, 2) pixels, gaps filled.
         seen: (rows, columns) whether a corner was seen there.
         bright: whether the square between +column and +row of the first corner is the bright one.

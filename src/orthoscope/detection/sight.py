@@ -15,7 +15,7 @@ TWICE = "is in it more than once; the one that shows most of itself was taken"
 class Sight(NamedTuple):
     """Corners that were found.
 
-    Args:
+    Attributes:
         ids: (n,) rows of the target's points, ascending.
         pixels: (n,2) where they are.
         remark: what a person should know of the choice, as it is told after the target's name; mostly empty.

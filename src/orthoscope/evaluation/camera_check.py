@@ -50,7 +50,7 @@ CHANGES = {
 class CameraCheck:
     """A camera beside the one that other photographs give by themselves.
 
-    Args:
+    Attributes:
         fresh: the calibration of the photographs.
         apart_px: rms difference of the two images over the seen part, a turn fitted out; pixels per point.
         known_px: how far off the fresh camera is itself, as predicted.

@@ -39,7 +39,7 @@ FEWEST_VIEWS = 5
 class ViewError:
     """One photograph's share.
 
-    Args:
+    Attributes:
         image: its name.
         corners: that were used.
         rms_px: per point, in the calibration.

@@ -89,8 +89,9 @@ def calibrate(detections: Detections, *, method: str = "decoupled", **settings: 
     Discs are calibrated twice: what a first fit says of their tilt moves the centres of their outlines to
     where the discs' centres are seen (`fitting/disc_centres.py`).
 
-    Raises CalibrationError where the views cannot tell the camera, InputError for a method or a setting that
-    is none.
+    Raises:
+        CalibrationError: the views cannot tell the camera.
+        InputError: a method or a setting that is none.
     """
     check_settings(method, settings)
     found = METHODS[method](detections, **settings)
@@ -142,7 +143,8 @@ def _told(kind: Any) -> str:
 def settings_of(method: str) -> list[str]:
     """The names of a method's settings.
 
-    Raises InputError for a method that is none.
+    Raises:
+        InputError: a method that is none.
     """
     if method not in METHODS:
         raise InputError(f"method {method!r} is not known; expected one of {', '.join(METHODS)}.")

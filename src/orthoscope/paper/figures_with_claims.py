@@ -49,7 +49,8 @@ class Kind:
     """A figure before its numbers: what it shows of which study, the claims about it; then its file's name,
     the page's, and the scene.
 
-    even: levels at equal distances.
+    Attributes:
+        even: levels at equal distances.
     """
 
     study: str

@@ -53,8 +53,10 @@ class Straightened(NamedTuple):
 
 
 def check_views(detections: Detections) -> None:
-    """Raises CalibrationError where there are too few photographs to compute from some and to test on
-    others.
+    """Check that there are enough photographs to compute from some and to test on others.
+
+    Raises:
+        CalibrationError: there are too few.
     """
     if len(detections.views) < FEWEST_VIEWS:
         raise CalibrationError(

@@ -38,9 +38,12 @@ class Plan:
     """How much is run: trials of figs. 2 to 5 and of the number of images; fewer for tables; which levels;
     the seed of everything random.
 
-    board: the sub-grid of the paper's board that all but the points' studies use, None for all of it. points:
-    sub-grids of the paper's board; grids: how many of the photographed one. lenses: those that every method
-    is tried with. dampings: of eq. (7), searched on data of condition eq7.
+    Attributes:
+        board: the sub-grid of the paper's board that all but the points' studies use, None for all of it.
+        points: sub-grids of the paper's board.
+        grids: how many of the photographed one.
+        lenses: those that every method is tried with.
+        dampings: of eq. (7), searched on data of condition eq7.
     """
 
     trials: int = 25
@@ -128,8 +131,11 @@ def run(
 ) -> Results:
     """Run a plan, and the paper's section 4.2 on detections where there are any.
 
-    executor: where trials run; by default here, one after the other. progress: called with (jobs done, jobs).
-    Raises CalibrationError where the photographs are too few.
+    Args:
+        executor: where trials run; by default here, one after the other.
+        progress: called with (jobs done, jobs).
+    Raises:
+        CalibrationError: the photographs are too few.
     """
     if detections:
         check_views(detections)

@@ -216,7 +216,8 @@ def _data(conditions: Sequence[Condition], scene: str, seed: int, trial: int) ->
 def _unseen(camera: Camera, test: Detections) -> float:
     """The share of test corners for which the camera has no ray.
 
-    Raises CalibrationError where they are too many.
+    Raises:
+        CalibrationError: they are too many.
     """
     lost = np.isnan(camera.unproject(np.concatenate([view.pixels for view in test.views]))[:, 2])
     if lost.mean() > UNSEEN_SHARE:

@@ -89,7 +89,8 @@ class MisfitRow:
     """A row of the table of misfits: of what, the part that views agree on and the part that they do not
     (px), F, F by chance, p-values.
 
-    moves: by how much the image of the camera is off for it, pixels, where that is known.
+    Attributes:
+        moves: by how much the image of the camera is off for it, pixels, where that is known.
     """
 
     what: str

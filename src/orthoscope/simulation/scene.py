@@ -216,7 +216,11 @@ def random_views(
 def _check_ranges(
     count: int, tilt: tuple[float, float], roll: tuple[float, float], fill: tuple[float, float], margin: float
 ) -> None:
-    """Raise InputError where a parameter of `random_views` makes no sense."""
+    """Check that each parameter of `random_views` makes sense.
+
+    Raises:
+        InputError: one does not.
+    """
     if count < 1:
         raise InputError(f"count is {count}; expected at least 1 view.")
     if not 0 <= tilt[0] <= tilt[1] < np.pi / 2:

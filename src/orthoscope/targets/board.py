@@ -25,7 +25,7 @@ __all__ = ["Board"]
 class Board(ABC):
     """One kind of target.
 
-    Args:
+    Attributes:
         kind: the word that its descriptions begin with.
         form: what comes after it.
         example: a whole description.

@@ -19,7 +19,7 @@ __all__ = ["Drawing"]
 class Drawing:
     """Black shapes on a white sheet, in the target's frame, x right and y down as printed.
 
-    Args:
+    Attributes:
         low, high: (2,) metres, opposite corners of the white sheet that the target needs.
         rectangles: (n,4) metres, x and y of one corner, then of the opposite one; they do not overlap.
         discs: (n,3) metres, x and y of the centre, radius; disjoint.

@@ -62,7 +62,7 @@ class Text(NamedTuple):
 class Page(NamedTuple):
     """A sheet of paper.
 
-    Args:
+    Attributes:
         width, height: mm.
         rectangles: (n,4) mm, x and y of one corner, then of the opposite one.
         discs: (k,3) mm, centre and radius.

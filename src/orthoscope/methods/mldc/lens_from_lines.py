@@ -92,9 +92,11 @@ def fit_straight_lens(
 ) -> StraightLens:
     """The lens, about a centre of its own, that makes the lines straightest, by least squares.
 
-    measure: of MEASURES, where distances are measured. Raises CalibrationError where the lines say too little
-        for so many coefficients, or the lens cannot see
-    the corners.
+    Args:
+        measure: of MEASURES, where distances are measured.
+    Raises:
+        CalibrationError: the lines say too little for so many coefficients, or the lens cannot see the
+            corners.
     """
     lines = SeenLines.of(observations, target)
 
@@ -169,8 +171,10 @@ def _best(solutions: list[Solution[Any]]) -> Solution[Any]:
 
 
 def _likeliest(problem: Lines, image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
-    """The starts under which the lines are least bent as they are, the best first; raises CalibrationError as
-    `fit_straight_lens` does.
+    """The starts under which the lines are least bent as they are, the best first.
+
+    Raises:
+        CalibrationError: as `fit_straight_lens` does.
     """
     _check_enough(problem)
     cameras = _starts(image_size, lens)
@@ -201,7 +205,11 @@ def _starts(image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
 
 
 def _check_enough(problem: Lines) -> None:
-    """Raises CalibrationError where each line could be met by bending the lens."""
+    """Check that not each line could be met by bending the lens.
+
+    Raises:
+        CalibrationError: it could.
+    """
     said, unknowns = problem.measurements - 2 * problem.lines, len(problem.free)
     if said < unknowns:
         raise CalibrationError(
