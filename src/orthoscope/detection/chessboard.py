@@ -151,7 +151,8 @@ def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -
     ways = placements(grid, board.columns, board.rows)
     arms = np.ones(grid.seen.shape)
     if isinstance(board, MarkedChessboard):
-        ways = ways_by_marks(grey, grid, ways, board)
+        negative = placements(grid, board.columns, board.rows, negative=True)
+        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(grey, grid, negative, board)
     if not ways or not _alike(ways, grid.seen, board.symmetries()):
         return None
     whole = grid.seen.size == board.columns * board.rows
