@@ -44,6 +44,9 @@ def test_a_part_without_any_of_the_boards_sides_has_ids_by_its_marks(board, roll
     assert isinstance(sight, Sight)
     assert 20 < len(sight.ids) < 90  # no side is in the picture
     assert_allclose(sight.pixels, truth[sight.ids], atol=0.3)
+    negative = see(255 - picture, target_of(board))
+    assert isinstance(negative, Sight)
+    assert_allclose(negative.pixels, truth[negative.ids], atol=0.3)
 
 
 def test_a_part_of_a_plain_board_and_one_whose_marks_are_covered_have_none():

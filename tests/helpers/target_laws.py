@@ -9,6 +9,7 @@ from orthoscope.targets.board import Board
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.circles import Circles
+from orthoscope.targets.grid_board import GridBoard
 from orthoscope.targets.marked_chessboard import MarkedChessboard
 
 BOARDS: tuple[Board, ...] = (
@@ -23,6 +24,7 @@ BOARDS: tuple[Board, ...] = (
     Charuco(7, 5, 0.03, 0.022, "DICT_5X5_100"),
     Charuco(5, 8, 0.03, 0.024, "DICT_4X4_50", legacy=True, first=17),
     AprilGrid(4, 3, 0.05, 0.3, first=40),
+    GridBoard(4, 3, 0.04, 0.01, "DICT_4X4_50", first=5),
     Circles(4, 11, 0.02, "asymmetric", 0.008),
     Circles(5, 6, 0.02, "asymmetric", 0.016),
     Circles(6, 6, 0.02, "symmetric", 0.008),

@@ -147,6 +147,8 @@ def calibrate_into(
         detections, files = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress
         )
+    for remark in detections.remarks:
+        tell(f"remark     {remark.image}: {remark.words}", err=True)
     save(detections, out / "detections.json")
     written = [out / "detections.json"]
     detections = left_out(detections, without) if without else detections

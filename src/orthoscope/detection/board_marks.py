@@ -42,8 +42,9 @@ def ways_by_marks(
     if not ways or min(grid.seen.shape) < 2:
         return ways
     marks = (_by_marker if board.dictionary else _by_discs)(grey, grid, ways, board)
-    if not any(hits for hits, _ in marks):  # no mark is seen: what none of them says is no evidence
-        return ways
+    if not any(hits for hits, _ in marks):
+        # no mark is seen where it ought to be: a way that has none in the picture is not right for that
+        return [] if any(misses for _, misses in marks) else ways
     return [way for way, (hits, misses) in zip(ways, marks, strict=True) if hits and not misses]
 
 

@@ -26,7 +26,7 @@ from orthoscope.detection.opencv_finders import opencv_boards
 from orthoscope.detection.partial_board import Grid, filled, grid_of, laid_out, placements
 from orthoscope.detection.refine import Refined, refined
 from orthoscope.detection.saddle_points import saddle_points
-from orthoscope.detection.sight import Sight, Unseen
+from orthoscope.detection.sight import TWICE, Sight, Unseen
 from orthoscope.geometry.arrays import Bool, Float, InputError, Int, ndarray
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.marked_chessboard import MarkedChessboard
@@ -78,17 +78,18 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             " at least 3x3."
         )
     parts, hanging, open_ = [], 0, False
-    for found, copy in _hanging_together(grey):
+    for found, copy, others in _hanging_together(grey):
         hanging = max(hanging, len(found.pixels))
         if hanging > FLOOR_RATIO * board.columns * board.rows:
             break
-        grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_CORNERS else None
+        grid = _in_photograph(grey, copy, found, board)
         if grid is None:
             continue
-        sight = _on_board(grey, grid._replace(corners=to_photograph(grid.corners, copy, grey)), board)
+        sight = _on_board(grey, grid, board)
         open_ |= sight is None
         if sight and len(sight.ids) == board.columns * board.rows:
-            return sight
+            alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in others)
+            return sight._replace(remark=TWICE) if alike else sight
         parts += [sight] if sight and len(sight.ids) >= FEWEST_CORNERS else []
     best = max(parts, key=lambda sight: len(sight.ids), default=None)
     count = board.columns * board.rows
@@ -101,6 +102,20 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
     return Unseen("only a part of it was seen, which may be several" if open_ else "was not found in it")
 
 
+def _in_photograph(
+    grey: ndarray, copy: ndarray, found: CornerLattice, board: Chessboard | MarkedChessboard
+) -> Grid | None:
+    """The grid of a copy's lattice, in the photograph's pixels; None where nothing is left of it."""
+    grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_CORNERS else None
+    return grid and grid._replace(corners=to_photograph(grid.corners, copy, grey))
+
+
+def _is_whole(grid: Grid | None, board: Chessboard | MarkedChessboard) -> bool:
+    """Whether a grid is a whole board of these counts."""
+    whole = grid is not None and grid.seen.size == board.columns * board.rows
+    return whole and bool(placements(grid, board.columns, board.rows))
+
+
 def find_chessboard(grey: ndarray, columns: int, rows: int) -> Float[ndarray, "m 2"] | None:
     """The inner corners (columns * rows, 2) of a board that is wholly seen, pixels, row by row; None without
     one.
@@ -111,7 +126,7 @@ def find_chessboard(grey: ndarray, columns: int, rows: int) -> Float[ndarray, "m
 
 def board_size(grey: ndarray) -> tuple[int, int] | None:
     """The columns and rows of the board that is in a photograph, all four of its sides seen; else None."""
-    for found, copy in _hanging_together(grey):
+    for found, copy, _ in _hanging_together(grey):
         grid = laid_out(copy, found, max(found.size))
         if grid and all(grid.ends) and min(grid.seen.shape) > 2:
             rows, columns = sorted(grid.seen.shape)
@@ -119,15 +134,16 @@ def board_size(grey: ndarray) -> tuple[int, int] | None:
     return None
 
 
-def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray]]:
-    """The largest lattices of each copy, and the copy."""
+def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, list[CornerLattice]]]:
+    """The largest lattices of each copy, the copy, and the lattices of it that are smaller."""
     shapes = set()
     for side in COPY_SIDES:
         copy = resized(grey, side)
         if copy.shape not in shapes:
             shapes.add(copy.shape)
-            for found in lattices(saddle_points(copy))[:LATTICES_PER_COPY]:
-                yield found, copy
+            found = lattices(saddle_points(copy))[:LATTICES_PER_COPY]
+            for number, one in enumerate(found, 1):
+                yield one, copy, found[number:]
 
 
 def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> Sight | None:
@@ -135,7 +151,8 @@ def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -
     ways = placements(grid, board.columns, board.rows)
     arms = np.ones(grid.seen.shape)
     if isinstance(board, MarkedChessboard):
-        ways = ways_by_marks(grey, grid, ways, board)
+        negative = placements(grid, board.columns, board.rows, negative=True)
+        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(grey, grid, negative, board)
     if not ways or not _alike(ways, grid.seen, board.symmetries()):
         return None
     whole = grid.seen.size == board.columns * board.rows

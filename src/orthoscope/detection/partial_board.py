@@ -88,8 +88,15 @@ def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
     return _taken_further(grey, grid, seen, bright, most)
 
 
-def placements(grid: Grid, columns: int, rows: int) -> list[Int[ndarray, "r c"]]:
-    """Ids (rows, columns) of the grid's corners, seen or not, for each way it can lie on a board."""
+def placements(grid: Grid, columns: int, rows: int, *, negative: bool = False) -> list[Int[ndarray, "r c"]]:
+    """Ids (rows, columns) of the grid's corners, seen or not, for each way it can lie on a board.
+
+    Args:
+        grid: the lattice.
+        columns: inner corners of the board.
+        rows: likewise.
+        negative: whether to take white for black.
+    """
     as_said, inverted = [], []
     for quarters in range(4):
         seen = np.rot90(grid.seen, quarters)
@@ -109,6 +116,8 @@ def placements(grid: Grid, columns: int, rows: int) -> list[Int[ndarray, "r c"]]
                     continue
                 ids = np.add.outer((np.arange(height) + row) * columns, np.arange(width) + column)
                 (inverted if dark == bright else as_said).append(np.rot90(ids, -quarters))
+    if negative:
+        return inverted
     if (columns + rows) % 2 or (columns == rows and columns % 2):  # white for black is the board turned
         return as_said
     whole = grid.seen.size == columns * rows

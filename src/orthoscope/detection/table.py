@@ -9,12 +9,14 @@ from orthoscope.detection.aprilgrid import see_aprilgrid
 from orthoscope.detection.charuco import see_charuco
 from orthoscope.detection.chessboard import see_chessboard
 from orthoscope.detection.circles import see_circles
+from orthoscope.detection.grid_board import see_grid_board
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.circles import Circles
+from orthoscope.targets.grid_board import GridBoard
 from orthoscope.targets.marked_chessboard import MarkedChessboard
 from orthoscope.targets.target import Target
 
@@ -25,6 +27,7 @@ DETECTORS: dict[str, Callable[[ndarray, Any], Sight | Unseen]] = {
     MarkedChessboard.kind: see_chessboard,
     Charuco.kind: see_charuco,
     AprilGrid.kind: see_aprilgrid,
+    GridBoard.kind: see_grid_board,
     Circles.kind: see_circles,
 }
 
