@@ -25,6 +25,7 @@ from orthoscope.cli.given_files import keeping_inputs
 from orthoscope.cli.paper import paper
 from orthoscope.cli.report import report
 from orthoscope.cli.simulate import simulate
+from orthoscope.cli.straighten import straighten
 from orthoscope.cli.target import target
 from orthoscope.cli.telling import tell
 from orthoscope.cli.undistort import undistort
@@ -54,6 +55,7 @@ for verb in (
     evaluate,
     compare,
     undistort,
+    straighten,
     export,
     convert,
     tools,
