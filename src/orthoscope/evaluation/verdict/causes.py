@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
+from orthoscope.geometry.numbers import rough_pixels
 
 __all__ = ["CAUSES", "FEW_VIEWS", "Cause", "listed"]
 
@@ -81,7 +82,8 @@ KINDS = {
         f"the focal length changes between them by about {100 * s.differ_focal:.2g} % (zoom or focus)"
     ),
     "centre": lambda s: (
-        f"the image moves on the sensor by about {s.differ_centre_px:.2g} px (a stabiliser or cropping)"
+        f"the image moves on the sensor by about {rough_pixels(s.differ_centre_px)} px"
+        " (a stabiliser or cropping)"
     ),
     "shutter": lambda s: "they were read row by row while camera or target moved (a rolling shutter)",
 }
@@ -138,7 +140,7 @@ CAUSES: tuple[Cause, ...] = (
         _as_far_as_it_goes,
         lambda s: (
             f"{_formula(s)} cannot follow this lens: at the same places of every photograph"
-            f" corners are off by {s.lens_px:.2g} px"
+            f" corners are off by {rough_pixels(s.lens_px)} px"
         ),
     ),
     Cause(
