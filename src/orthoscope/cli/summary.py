@@ -115,7 +115,7 @@ def _error_lines(evaluation: Evaluation) -> list[str]:
         return []
     return [
         f"off by     {error.seen_px:.3f} px where corners were seen, {error.frame_px:.3f} over the frame;"
-        f" at the target's distance {error.near_seen_px:.3f}, {error.near_frame_px:.3f}",
+        f" at the target's distances {error.near_seen_px:.3f}, {error.near_frame_px:.3f}",
         f"           of it {error.model_px:.3f} by independent errors of corners, {error.alike_px:.3f} with"
         f" errors alike in a view, {error.views_px:.3f} by leaving views out, {error.bias_px:.3f} against the"
         " richest model",

@@ -27,10 +27,10 @@ import numpy as np
 
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.scatter import Scatter
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 from orthoscope.models.camera import Camera
 
-__all__ = ["CameraError", "predicted_error", "rms_difference", "seen_places"]
+__all__ = ["CameraError", "picked", "predicted_error", "rms_difference", "seen_places"]
 
 # So many corners stand for all that were seen.
 PLACE_COUNT = 240
@@ -54,7 +54,9 @@ class CameraError:
 
     Attributes:
         seen_px, frame_px: root mean square over the seen part and over the frame, of what is far away.
-        near_seen_px, near_frame_px: the same of things at the target's distance.
+        near_seen_px, near_frame_px: the same of things where the target was: over the seen part each corner
+            at its own distance, since a shift of the camera undoes less where distances differ; over the
+            frame at the typical one.
         model_px, alike_px, views_px, bias_px: over the seen part, far away, what makes it up: independent
             errors of corners with the priors' scatter; these with errors alike within a view; the jackknife
             over views with the priors' scatter; what a poorer model misses.
@@ -108,6 +110,7 @@ class _Variances:
         fitted: int,
         distance: float,
     ) -> None:
+        # rays may have lengths of their own: places along them, in units of the distance
         slopes = _settled(scatter, rays, fitted, distance)
         self.model, self.alike = _spread(slopes, scatter.model), _spread(slopes, scatter.alike)
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
@@ -135,26 +138,35 @@ class _Variances:
 
 
 def predicted_error(
-    scatter: Scatter, seen: Float[ndarray, "s 2"], *, distance: float, richest: Scatter | None = None
+    scatter: Scatter,
+    seen: Float[ndarray, "s 2"],
+    *,
+    distance: float | Float[ndarray, " s"],
+    richest: Scatter | None = None,
 ) -> CameraError:
     """The error that is to be expected of a camera.
 
     Args:
         scatter: of the camera.
         seen: pixels where corners were detected (`seen_places`).
-        distance: of the target in the typical view, metres.
+        distance: of the corner that was seen there, metres; one for all where that will do.
         richest: scatter of the richest model of the same photographs; None where it is this one.
     """
     camera = scatter.camera
     width, height = camera.image_size
     cells = _cells(width, height)
-    rays = camera.unproject(seen)
-    seen, rays = seen[np.isfinite(rays[:, 0])], rays[np.isfinite(rays[:, 0])]
+    rays, each = camera.unproject(seen), np.broadcast_to(np.asarray(distance, dtype=float), len(seen))
+    known = np.isfinite(rays[:, 0])
+    seen, rays, each = seen[known], rays[known], each[known]
+    typical = float(np.median(each))
     middle = np.median(seen, axis=0)
     ways = _ways(middle, width, height)
     places = np.concatenate([rays, camera.unproject(cells), camera.unproject(ways.reshape(-1, 2))])
     part_seen, part_frame = slice(len(seen)), slice(len(seen), len(seen) + len(cells))
-    far, near = (_Variances(scatter, richest, places, len(seen), to) for to in (np.inf, distance))
+    lengths = np.ones(len(places))
+    lengths[part_seen] = each / typical
+    far = _Variances(scatter, richest, places, len(seen), np.inf)
+    near = _Variances(scatter, richest, lengths[:, None] * places, len(seen), typical)
     seen_px, model_px, alike_px, views_px, bias_px = far.over(part_seen)
     limit = max(GENEROUS_RATIO * seen_px, NEGLIGIBLE_PX)
     along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(DIRECTION_COUNT, REGION_STEPS)
@@ -167,7 +179,7 @@ def predicted_error(
         alike_px=alike_px,
         views_px=views_px,
         bias_px=bias_px,
-        distance=distance,
+        distance=typical,
         far=np.sqrt(far.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
         near=np.sqrt(near.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
         limit_px=limit,
@@ -193,8 +205,13 @@ def rms_difference(
 
 def seen_places(pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "s 2"]:
     """Detected corners, evenly picked, that stand for all; the same whatever the order of the views."""
-    ordered = pixels[np.lexsort(pixels.T)]
-    return ordered[np.unique(np.linspace(0, len(ordered) - 1, PLACE_COUNT).round().astype(int))]
+    return pixels[picked(pixels)]
+
+
+def picked(pixels: Float[ndarray, "n 2"]) -> Int[ndarray, " s"]:
+    """Which of the detected corners `seen_places` picks."""
+    order = np.lexsort(pixels.T)
+    return order[np.unique(np.linspace(0, len(order) - 1, PLACE_COUNT).round().astype(int))]
 
 
 def _settled(

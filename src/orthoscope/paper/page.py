@@ -212,7 +212,10 @@ def _members(results: Results) -> list[tuple[str, list[list[str]]]]:
 def _lenses(results: Results) -> list[tuple[str, str, list[Cell], str]]:
     """Every method with every lens: method, lens, training and test NCE in each scene, failures."""
     curves = {scene: curves_of(results.outcomes, study="lenses", scene=scene) for scene in SCENES}
+    if not all(curves.values()):
+        return []
     pairs = [(method, lens, f"{method} {lens}") for method in METHODS for lens in results.plan.lenses]
+    pairs = [pair for pair in pairs if pair[2] in curves[SCENES[0]]]
     columns = [(curves[scene], of) for scene in SCENES for of in ("training_nce", "test_nce")]
     values = np.array(
         [[float(getattr(of_scene[name], of)[0]) for of_scene, of in columns] for *_, name in pairs]

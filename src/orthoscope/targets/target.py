@@ -132,7 +132,9 @@ class Target:
 
 def target_of(board: Board) -> Target:
     """The target that a board describes, corners where it is drawn."""
-    return Target(board.description, board.points(), board.lines(), board.grid, board)
+    return Target(
+        board.description, board.points(), board.lines(), board.grid if board.row_by_row else None, board
+    )
 
 
 def several(targets: Sequence[Target]) -> Target:

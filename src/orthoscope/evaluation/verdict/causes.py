@@ -35,6 +35,8 @@ WILD_SHARE = 0.005
 SPARSE_SHARE = 0.75
 # A sentence lists so many images.
 NAMED_IMAGES = 3
+# A principal point that is known no better than this share of the image's width is open.
+ADRIFT_SHARE = 0.1
 
 
 class Cause(NamedTuple):
@@ -73,29 +75,31 @@ def _lens_is_missed(s: Situation) -> bool:
 def _of_photographs(s: Situation) -> Grade:
     apart = 2.0 * s.differ_px if s.groups else s.differ_px
     if s.disagree == "shutter" and not s.groups:  # the camera is one; what the shutter did is in its error
-        return Grade.USABLE
+        return _as_far_as_it_goes(s)
     return Grade.NO if apart > s.coarse_px else Grade.USABLE
 
 
+APART = "the photographs do not agree on one camera"
 KINDS = {
     "zoom": lambda s: (
-        f"the focal length changes between them by about {100 * s.differ_focal:.2g} % (zoom or focus)"
+        f"{APART}: the focal length changes between them by about {100 * s.differ_focal:.2g} % (zoom or"
+        " focus)"
     ),
     "centre": lambda s: (
-        f"the image moves on the sensor by about {rough_pixels(s.differ_centre_px)} px"
+        f"{APART}: the image moves on the sensor by about {rough_pixels(s.differ_centre_px)} px"
         " (a stabiliser or cropping)"
     ),
-    "shutter": lambda s: "they were read row by row while camera or target moved (a rolling shutter)",
+    # It is one camera all the same.
+    "shutter": lambda s: (
+        "the photographs were read row by row while camera or target moved (a rolling shutter)"
+    ),
 }
 
 
 def _photographs(s: Situation) -> str:
-    how = (
-        f"{listed(s.groups[1])} are of another than {listed(s.groups[0])}"
-        if s.groups
-        else KINDS[s.disagree](s)
-    )
-    return f"the photographs do not agree on one camera: {how}"
+    if s.groups:
+        return f"{APART}: {listed(s.groups[1])} are of another than {listed(s.groups[0])}"
+    return KINDS[s.disagree](s)
 
 
 def _open(s: Situation) -> bool:
@@ -130,8 +134,10 @@ CAUSES: tuple[Cause, ...] = (
     Cause(
         "corners",
         lambda s: s.wild > WILD_SHARE * s.corners,
-        lambda s: Grade.USABLE,
-        lambda s: f"{s.wild} of {s.corners} corners are far from where the others put them",
+        lambda s: _as_far_as_it_goes(s) if s.method == "decoupled" else Grade.USABLE,
+        lambda s: (
+            f"{s.wild} of {s.corners} corners are far from where the others put them{_where(s.wild_in)}"
+        ),
     ),
     Cause("photographs", _matters, _of_photographs, _photographs),
     Cause(
@@ -171,7 +177,16 @@ CAUSES: tuple[Cause, ...] = (
             else f"of {s.views} photographs only {s.distinct} differ from one another"
         ),
     ),
-    Cause("open", _open, _as_far_as_known, lambda s: "these photographs do not tell it better"),
+    Cause(
+        "open",
+        _open,
+        _as_far_as_known,
+        lambda s: (
+            "where the lens's axis meets the image is open, as it is with a lens this long"
+            if s.centre_sd > ADRIFT_SHARE
+            else "these photographs do not tell it better"
+        ),
+    ),
     Cause(
         "solver",
         lambda s: not s.converged and s.error_px > FINE_PX,
@@ -185,6 +200,10 @@ CAUSES: tuple[Cause, ...] = (
         lambda s: f"too few corners were seen {s.place}",
     ),
 )
+
+
+def _where(images: Sequence[str]) -> str:
+    return f", in {listed(images)}" if images else ""
 
 
 def _photograph(count: int) -> str:

@@ -21,6 +21,10 @@ HEADS = {
 }
 
 
+# Where the error at the target's distances is no more than this share of that far away, both are told.
+NEARER_SHARE = 0.5
+
+
 class Verdict(NamedTuple):
     """What a user should know before anything else.
 
@@ -71,10 +75,13 @@ def far_on_others(rms_px: float, image_size: tuple[int, int]) -> str:
 def _far(grade: Grade, s: Situation) -> str:
     if isnan(s.error_px):
         return f"{HEADS[grade]}: nothing says how far off it is."
-    told = f"{HEADS[grade]}: off by about {rough_pixels(s.error_px)} px where corners were seen"
     if grade in (Grade.GOOD, Grade.REGION):
-        told += f", and by less than {FINE_PX:g} px over {_share(s.held)} of the frame"
-    return told + "."
+        seen = f"off by about {rough_pixels(s.error_px)} px where corners were seen"
+        return f"{HEADS[grade]}: {seen}, and by less than {FINE_PX:g} px over {_share(s.held)} of the frame."
+    if s.near_px <= NEARER_SHARE * s.error_px:
+        near = f"off by about {rough_pixels(s.near_px)} px at the distances where the target was"
+        return f"{HEADS[grade]}: {near}, by {rough_pixels(s.error_px)} px far away."
+    return f"{HEADS[grade]}: off by about {rough_pixels(s.error_px)} px where corners were seen."
 
 
 def _share(share: float) -> str:

@@ -178,6 +178,9 @@ class SituationFile(Record):
     target_mm: Number
     suspects: tuple[tuple[str, str], ...]
     precious: tuple[tuple[str, str], ...]
+    near_px: Number = None
+    centre_sd: float = 0.0
+    wild_in: tuple[str, ...] = ()
 
 
 class GroupsFile(Record):
