@@ -25,6 +25,7 @@ from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections, View, photograph_of, view_name
 from orthoscope.targets.left_out import left_out
 from orthoscope.targets.table import parse_target
+from orthoscope.targets.target import Target
 
 CAMERA = Camera((800, 600), Intrinsics(700.0, 698.0, 404.0, 296.0), Brown(k1=-0.2, k2=0.05))
 RENDERER = Renderer(CAMERA)
@@ -172,3 +173,19 @@ def test_shapes_have_no_similarity_of_either_target_and_no_pattern_over_both(sim
     assert np.abs(settled).max() < 1e-3
     for part in target.parts:
         assert_allclose(settled[part].mean(0), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "spec", ["chessboard:6x5:25mm", "charuco:6x5:30mm:22mm:DICT_4X4_50", "aruco:4x3:40mm:10mm:DICT_4X4_50"]
+)
+def test_of_two_boards_alike_the_choice_is_said(spec, tmp_path):
+    board = parse_target(spec)
+    one, other = side_by_side(Target("twice", board.points, members=(board, board)), 0.1)
+    found = detect(RENDERER.photograph_of([one, other], rng=np.random.default_rng(0)), board)
+    assert len(found.views[0].ids) == len(board.points)
+    ((image, words),) = found.remarks
+    assert image == "picture01"
+    assert "more than once" in words
+    save(found, tmp_path / "d.json")
+    assert load(tmp_path / "d.json").remarks == found.remarks
+    assert not detect(RENDERER.photograph_of([one], rng=np.random.default_rng(0)), board).remarks

@@ -32,9 +32,13 @@ def detections_from(
 ) -> tuple[Detections, dict[str, Path]]:
     """Detections, and where the photograph of each name is (empty where corners were found before).
 
-    paths: photographs (files, folders, globs), or one .json of ours, or one .vnl. target: needed but for our
-    own file. image_size: needed with a .vnl, which does not know it. jobs, executor, progress: as in
-    `detect`. Raises InputError where something needed is missing.
+    Args:
+        paths: photographs (files, folders, globs), or one .json of ours, or one .vnl.
+        target: needed but for our own file.
+        image_size: needed with a .vnl, which does not know it.
+        jobs, executor, progress: as in `detect`.
+    Raises:
+        InputError: something needed is missing.
     """
     if len(paths) == 1 and Path(paths[0]).suffix == ".json":
         return load_detections(paths[0]), {}

@@ -19,7 +19,7 @@ __all__ = ["OnOthers", "json_of", "lines_of", "on_others"]
 class OnOthers(NamedTuple):
     """What was found.
 
-    Args:
+    Attributes:
         error: with the camera fixed and poses fitted.
         board: whether it is the board of the calibration; None where that was not asked.
         check: the camera beside the one that the photographs give; None where they tell none.

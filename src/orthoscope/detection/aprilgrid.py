@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from orthoscope.detection.grid import grid_shape, nearest_neighbour
-from orthoscope.detection.markers import Markers, find_markers, of_one_board
+from orthoscope.detection.markers import Markers, find_markers, of_one_board, remark_on
 from orthoscope.detection.refine import refined
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import ndarray
@@ -51,7 +51,7 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
     numbers = found.numbers - board.first
     known = (numbers >= 0) & (numbers < count)
     markers = Markers(numbers[known], found.corners[known])
-    ids, corners = _of_board(markers, board)
+    ids, corners, remark = _of_board(markers, board)
     inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(1)
     ids, corners = ids[inside], corners[inside]
     if len(ids) < FEWEST_CORNERS:
@@ -70,7 +70,7 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
             f"was not found in it: {len(ids) // 4} of its tags were, but without squares at their corners"
         )
     order = np.argsort(ids)
-    return Sight(ids[order], pixels[order])
+    return Sight(ids[order], pixels[order], remark)
 
 
 def _fitted(grey: ndarray, ids: ndarray, corners: ndarray, board: AprilGrid) -> tuple[ndarray, ndarray]:
@@ -106,14 +106,14 @@ def _next_to(
     return missing[close][inside], foreseen[inside]
 
 
-def _of_board(markers: Markers, board: AprilGrid) -> tuple[ndarray, ndarray]:
-    """Ids and pixels of the corners of the tags that are the board's, each once."""
+def _of_board(markers: Markers, board: AprilGrid) -> tuple[ndarray, ndarray, str]:
+    """Ids and pixels of the corners of the tags that are the board's, each once; a remark on the choice."""
     plane, corners = board.points()[:, :2], board.tag_corners()
-    best = np.zeros(0, dtype=int), np.zeros((0, 2))
+    best = np.zeros(0, dtype=int), np.zeros((0, 2)), ""
     for quarters in WAYS_UP:
         turned = Markers(markers.numbers, np.roll(markers.corners, quarters, axis=1))
         mine = of_one_board(turned, plane[corners[markers.numbers]])
         ids, first = np.unique(corners[markers.numbers[mine]].ravel(), return_index=True)
         if len(ids) > len(best[0]):
-            best = ids, turned.corners[mine].reshape(-1, 2)[first]
+            best = ids, turned.corners[mine].reshape(-1, 2)[first], remark_on(markers, mine)
     return best

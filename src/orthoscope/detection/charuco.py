@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.grid import grid_shape
-from orthoscope.detection.markers import Markers, find_markers, homography_of, of_one_board
+from orthoscope.detection.markers import Markers, find_markers, homography_of, of_one_board, remark_on
 from orthoscope.detection.partial_board import filled
 from orthoscope.detection.refine import refined
 from orthoscope.detection.sight import Sight, Unseen
@@ -43,7 +43,7 @@ def see_charuco(grey: ndarray, board: Charuco) -> Sight | Unseen:
     """
     count = len(board.marker_squares())
     found = find_markers(grey, board.dictionary, int(ENOUGH_MARKERS_SHARE * count))
-    markers, legacy = _in_layout(found, board)
+    markers, legacy, remark = _in_layout(found, board)
     if not len(markers.numbers):
         return Unseen(f"was not found in it: none of the markers of {board.dictionary} was")
     columns, rows = board.grid
@@ -54,14 +54,14 @@ def see_charuco(grey: ndarray, board: Charuco) -> Sight | Unseen:
             f"was not found in it: {len(markers.numbers)} of its markers were, but no corners between them"
         )
     ids = np.flatnonzero(good)
-    return Sight(ids, corners.reshape(-1, 2)[ids])
+    return Sight(ids, corners.reshape(-1, 2)[ids], remark)
 
 
-def _in_layout(found: Markers, board: Charuco) -> tuple[Markers, bool]:
-    """The markers that are the board's, and whether they lie in the old layout; of two equally good, as it is
-    said.
+def _in_layout(found: Markers, board: Charuco) -> tuple[Markers, bool, str]:
+    """The markers that are the board's, whether they lie in the old layout (of two equally good, as it is
+    said), and a remark on the choice.
     """
-    best = Markers(found.numbers[:0], found.corners[:0]), board.legacy
+    best = Markers(found.numbers[:0], found.corners[:0]), board.legacy, ""
     numbers = found.numbers - board.first
     for legacy in (board.legacy, not board.legacy):
         plane = board.marker_corners(legacy=legacy)
@@ -69,7 +69,8 @@ def _in_layout(found: Markers, board: Charuco) -> tuple[Markers, bool]:
         markers = Markers(numbers[known], found.corners[known])
         mine = of_one_board(markers, plane[markers.numbers])
         if mine.sum() > len(best[0].numbers):
-            best = Markers(markers.numbers[mine], markers.corners[mine]), legacy
+            chosen = Markers(markers.numbers[mine], markers.corners[mine])
+            best = chosen, legacy, remark_on(markers, mine)
     return best
 
 

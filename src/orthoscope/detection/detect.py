@@ -26,7 +26,7 @@ from orthoscope.files.images import MOST_MEGAPIXELS
 from orthoscope.files.pictures import Given, Picture, pictures
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.targets.chessboard import Chessboard
-from orthoscope.targets.detections import Detections, SetAside, View, view_name
+from orthoscope.targets.detections import Detections, Remark, SetAside, View, view_name
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
@@ -84,9 +84,15 @@ def detect(
                 progress(len(looks), len(given), names[len(looks) - 1])
     size = _usual_size(looks)
     views, aside = _sorted_out(names, looks, size, bool(target.members))
+    remarks = [
+        Remark(name, f"{(target.members or (target,))[number].name} {sight.remark}")
+        for name, look in zip(names, looks, strict=True)
+        for number, sight in look.found.items()
+        if sight.remark
+    ]
     if not views or size is None:
         raise CalibrationError(_nothing_found(given, looks, target, aside))
-    return Detections(target, size, tuple(views), tuple(aside))
+    return Detections(target, size, tuple(views), tuple(aside), remarks=tuple(remarks))
 
 
 def _placed(picture: Picture) -> Picture:
@@ -146,7 +152,7 @@ def _sorted_out(
             aside.append(SetAside(name, look.reason))
         else:
             views += [
-                View(view_name(name, number) if several else name, *sight)
+                View(view_name(name, number) if several else name, sight.ids, sight.pixels)
                 for number, sight in look.found.items()
             ]
         if look.digest:

@@ -28,7 +28,7 @@ SMOOTH_FIT = (5, 2)
 class GridShape(NamedTuple):
     """At each of m corners.
 
-    Args:
+    Attributes:
         along, down: (m,2) one step along the row and along the column, pixels.
         bend_along, bend_down: (m,) curvature of those lines, 1/px, positive towards +90 degrees (from x to y)
             of their direction.

@@ -31,7 +31,7 @@ FEWEST_CORNERS = 4
 class CornerLattice(NamedTuple):
     """Corners that hang together.
 
-    Args:
+    Attributes:
         pixels: (n,2).
         cells: (n,2) column and row of each, whole, from 0; they run as x and y do, seen from the front.
         bright: (n,) whether the square between the next column and the next row is the bright one.

@@ -36,7 +36,7 @@ LEAST_LEFT_SHARE = 0.5
 LEAST_CONTRAST_SHARE = 0.3
 # A line goes on where at least this share of its corners that are in the picture stands out.
 GOING_ON_SHARE = 0.6
-# The board ends where this share of a line's squares alternates, with white behind the black ones.
+# The board ends where this share of a line's squares alternates, with white behind them.
 BLANK_SQUARES_SHARE = 0.75
 # A line at the rim with fewer than three corners, and less than this share of the next line's, is chance.
 THIN_LINE_SHARE = 0.34
@@ -47,7 +47,7 @@ COMPARED_LINES = 4
 class Grid(NamedTuple):
     """A lattice as a grid.
 
-    Args:
+    Attributes:
         corners: (rows, columns, 2) pixels, gaps filled.
         seen: (rows, columns) whether a corner was seen there.
         bright: whether the square between +column and +row of the first corner is the bright one.
@@ -88,8 +88,15 @@ def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
     return _taken_further(grey, grid, seen, bright, most)
 
 
-def placements(grid: Grid, columns: int, rows: int) -> list[Int[ndarray, "r c"]]:
-    """Ids (rows, columns) of the grid's corners, seen or not, for each way it can lie on a board."""
+def placements(grid: Grid, columns: int, rows: int, *, negative: bool = False) -> list[Int[ndarray, "r c"]]:
+    """Ids (rows, columns) of the grid's corners, seen or not, for each way it can lie on a board.
+
+    Args:
+        grid: the lattice.
+        columns: inner corners of the board.
+        rows: likewise.
+        negative: whether to take white for black.
+    """
     as_said, inverted = [], []
     for quarters in range(4):
         seen = np.rot90(grid.seen, quarters)
@@ -109,6 +116,8 @@ def placements(grid: Grid, columns: int, rows: int) -> list[Int[ndarray, "r c"]]
                     continue
                 ids = np.add.outer((np.arange(height) + row) * columns, np.arange(width) + column)
                 (inverted if dark == bright else as_said).append(np.rot90(ids, -quarters))
+    if negative:
+        return inverted
     if (columns + rows) % 2 or (columns == rows and columns % 2):  # white for black is the board turned
         return as_said
     whole = grid.seen.size == columns * rows
@@ -242,12 +251,11 @@ def _ends(grey: ndarray, grid: ndarray) -> bool:
     dark = near < before
     same = np.abs(far - near) < 2.0 * contrast
     alternates = np.abs(near - before) > 0.5 * np.median(np.abs(near - before))
-    paper = beyond > level
-    return bool(
-        (same & alternates).mean() >= BLANK_SQUARES_SHARE
-        and dark.any()
-        and paper[dark].mean() >= BLANK_SQUARES_SHARE
-    )
+    paper = beyond > level  # behind the bright ones too: where the board goes on, there are dark squares
+    if dark.all() or not dark.any():
+        return False
+    ends = min((same & alternates).mean(), paper[dark].mean(), paper[~dark].mean())
+    return bool(ends >= BLANK_SQUARES_SHARE)
 
 
 def _in_picture(grey: ndarray, places: ndarray) -> ndarray:

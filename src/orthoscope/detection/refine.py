@@ -59,7 +59,7 @@ def refined(
     places: Float[ndarray, "m 2"],
     *,
     approach: bool = True,
-    arm: float = 1.0,
+    arm: float | Float[ndarray, " m"] = 1.0,
 ) -> Refined:
     """Corners from ones that are right to a fifth of a step of their lattice.
 
@@ -67,7 +67,7 @@ def refined(
         grey: (h,w) uint8.
         rough: (m,2) pixels.
         places: (m,2) column and row of each in the lattice, in steps.
-        arm: how far from the edges something else than squares is printed, in steps.
+        arm: how far from the edges something else than squares is printed, in steps; of all or of each.
         approach: whether cornerSubPix comes near first; not where it went astray before.
     """
     square = nearest_neighbour(rough, places)
@@ -132,7 +132,7 @@ def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
     return places.astype(float)
 
 
-def _arms(shape: GridShape, arm: float) -> Float[ndarray, " m"]:
+def _arms(shape: GridShape, arm: float | Float[ndarray, " m"]) -> Float[ndarray, " m"]:
     """An arm of so many steps as a share of each corner's window; 1 where it reaches over it."""
     longest = np.maximum(np.maximum(np.hypot(*shape.along.T), np.hypot(*shape.down.T)), 1e-9)
     return np.minimum(ARM_SHARE * arm / np.minimum(WINDOW_SHARE, LARGEST_REACH / longest), 1.0)

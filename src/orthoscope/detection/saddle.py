@@ -75,10 +75,14 @@ def fit_saddles(
 ) -> Saddles:
     """The saddles near `start`.
 
-    grey: (h,w) uint8. along, down: from a corner to the sides of its window, pixels, in the directions of its
-    two edges. bends: curvature of the two edges, 1/px. arms: (n,) how
-    far from the edges, as a share of the window, its corners are left out, where something else is printed.
     Where the steps do not settle the last place is given, with what it explains.
+
+    Args:
+        grey: (h,w) uint8.
+        along, down: from a corner to the sides of its window, pixels, in the directions of its two edges.
+        bends: curvature of the two edges, 1/px.
+        arms: (n,) how far from the edges, as a share of the window, its corners are left out, where something
+            else is printed.
     """
     fit = _Fit(grey, start, along, down, bends, np.ones(len(start)) if arms is None else arms)
     fit.begin_with_one_blur()

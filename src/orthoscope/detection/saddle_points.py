@@ -42,7 +42,7 @@ MOST_SADDLES = 2500
 class SaddlePoints(NamedTuple):
     """n corners of four squares.
 
-    Args:
+    Attributes:
         pixels: (n,2) to about half a pixel.
         edges: (n,2) angles of the two edges, radians, 0 to pi, the bright square lying between the first and
             the second.

@@ -32,8 +32,12 @@ INNER_SHARE = 0.93
 class Shapes(NamedTuple):
     """What is known of n saddles so far.
 
-    places: (n,2) pixels. angles: (n,2) of the two edges, radians. blur: (n,) w, pixels. bends: (n,2)
-    curvatures, 1/px. relief: (n,) r = C / m, 0 where it is not known yet.
+    Attributes:
+        places: (n,2) pixels.
+        angles: (n,2) of the two edges, radians.
+        blur: (n,) w, pixels.
+        bends: (n,2) curvatures, 1/px.
+        relief: (n,) r = C / m, 0 where it is not known yet.
     """
 
     places: Float[ndarray, "n 2"]
@@ -50,10 +54,12 @@ class Shapes(NamedTuple):
 class Windows:
     """The pixels of n windows, k each.
 
-    grey: (h,w) uint8. start: (n,2) where the corners are to a few pixels. along, down: (n,2) from a corner to
-    the sides of its window. arms: (n,) how far
-    from the edges the window's corners are left out, as a share of it. level: (n,) mean grey, which the sums
-    do without.
+    Args:
+        grey: (h,w) uint8.
+        start: (n,2) where the corners are to a few pixels.
+        along, down: (n,2) from a corner to the sides of its window.
+        arms: (n,) how far from the edges the window's corners are left out, as a share of it.
+        level: (n,) mean grey, which the sums do without.
     """
 
     def __init__(

@@ -40,7 +40,7 @@ def see_members(grey: ndarray, target: Target) -> list[Sight | Unseen]:
         sight = found[number] = see(grey if marked else painted, member)
         if isinstance(sight, Sight):
             painted = _painted_over(painted, sight.pixels, _step(member, sight))
-            found[number] = Sight(sight.ids + target.parts[number].start, sight.pixels)
+            found[number] = sight._replace(ids=sight.ids + target.parts[number].start)
     return [found[number] for number in range(len(target.members))]
 
 

@@ -49,7 +49,7 @@ REGION_STEPS = 20
 class CameraError:
     """The predicted camera error, pixels per point.
 
-    Args:
+    Attributes:
         seen_px, frame_px: root mean square over the seen part and over the frame, of what is far away.
         near_seen_px, near_frame_px: the same of things where the target was: over the seen part each corner
             at its own distance, since a shift of the camera undoes less where distances differ; over the

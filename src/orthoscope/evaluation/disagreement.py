@@ -66,7 +66,7 @@ SAMPLE_COUNT = 300
 class Wishes(NamedTuple):
     """What each of m views would have liked c changes of K to be.
 
-    Args:
+    Attributes:
         kappa: (m,c) the wish, in the changes' own steps; 0 where the view has none.
         told: (m,c,c) T_j over the noise and tau: the inverse of the wish's covariance.
         f2: F over max(1, tau).
@@ -95,7 +95,7 @@ class Wishes(NamedTuple):
 class Disagreement:
     """Whether photographs agree on one camera.
 
-    Args:
+    Attributes:
         f2, p_value: of the test; NaN where the views do not suffice for one.
         certain: whether they surely do not.
         kind: what changes most between them: `zoom`, `centre`, `shutter`; empty where they agree.

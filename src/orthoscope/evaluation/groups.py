@@ -63,7 +63,7 @@ REFINED_GROUPINGS = 4
 class Groups(NamedTuple):
     """Two groups of views.
 
-    Args:
+    Attributes:
         first, second: indices of the views, ascending; the larger group first.
         unsure: of views that may be in either.
     """

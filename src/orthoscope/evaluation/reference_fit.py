@@ -31,7 +31,7 @@ ONE_FIT = ("decoupled", "fccm")
 class ReferenceFit:
     """The richest fit and what it says.
 
-    Args:
+    Attributes:
         known: it, linearised.
         left_out: each view left out of it.
         base: the formula under its free lens.

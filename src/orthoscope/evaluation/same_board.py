@@ -29,7 +29,7 @@ SURE_ERRORS = 2.0
 class SameBoard(NamedTuple):
     """Whether other photographs show the board that a camera was calibrated with.
 
-    Args:
+    Attributes:
         same: whether its learnt shape fits them better than no shape.
         sure: whether views agree on that beyond chance.
         learnt_px, said_px: rms per point with the learnt shape, and with corners where they are said to be.

@@ -30,7 +30,7 @@ USUAL_FOLDS = 5  # of a method that leaves no view out by itself
 class UnseenViews(NamedTuple):
     """What was found.
 
-    Args:
+    Attributes:
         residuals: (n,2) of each view, predicted minus detected, pixels; NaN where nothing foresees them.
         rms_px, error_px: of all, per point, and its standard error over views; NaN where there are none.
         nce: of all, NaN where there are none.

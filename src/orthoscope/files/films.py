@@ -14,6 +14,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from orthoscope.files.sensor_frames import open_film
 from orthoscope.geometry.arrays import InputError, ndarray
 
 __all__ = ["FILMS", "Frame", "frames_of"]
@@ -52,7 +53,7 @@ def frames_of(path: Path, *, most: int = MOST_FRAMES) -> list[Frame]:
     Raises:
         InputError: it cannot be read as a film.
     """
-    film = cv2.VideoCapture(str(path))
+    film = open_film(path)
     rate = film.get(cv2.CAP_PROP_FPS)
     rate = rate if np.isfinite(rate) and 0.1 < rate < 10_000 else 30.0
     kept: list[_Kept] = []

@@ -195,7 +195,8 @@ def _content(path: Path, most_megapixels: float) -> bytes:
 def checked_whole(content: bytes, path: Path_) -> bytes:
     """The bytes of a picture's file.
 
-    Raises InputError where there are none or they are cut off.
+    Raises:
+        InputError: there are none or they are cut off.
     """
     if not content:
         raise InputError(f"{path} is empty; expected a photograph. Copy it again or leave it out.")
@@ -211,7 +212,8 @@ def write_image(path: Path_, image: ndarray) -> None:
     """Writes a picture, uint8 (h,w) or (h,w,3), in the format that its name ends in; as a whole or not at
     all.
 
-    Raises InputError where the format is not known or the place cannot be written.
+    Raises:
+        InputError: the format is not known or the place cannot be written.
     """
     suffix = Path(path).suffix.lower()
     options = [cv2.IMWRITE_JPEG_QUALITY, 95] if suffix in (".jpg", ".jpeg") else []

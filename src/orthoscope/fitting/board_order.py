@@ -48,7 +48,7 @@ SAME_SHARE = 1e-6
 class Turn:
     """One way in which a target is its own image.
 
-    Args:
+    Attributes:
         rotation: (3,3) about the middle of its points.
         corners: (p,) which corner each one comes to lie on.
     """

@@ -33,7 +33,8 @@ def image_slopes(
     """Slopes of the pixels of rays by named parameters of the camera, then by its displacement's coefficients
     along x and along y.
 
-    Raises InputError for a name that the camera does not have.
+    Raises:
+        InputError: a name that the camera does not have.
     """
     parameters = Parameters.of(names)
     parameters.check(camera)

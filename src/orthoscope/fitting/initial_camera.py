@@ -225,8 +225,11 @@ def starts(
 ) -> list[Estimate]:
     """Where to start from to get a camera with the wanted lens, the likelier first.
 
-    coefficients: those that will move, by default what the lens frees; the others have their usual values.
-    Raises CalibrationError where the corners fit no camera, or lie where the wanted lens cannot see.
+    Args:
+        coefficients: those that will move, by default what the lens frees; the others have their usual
+            values.
+    Raises:
+        CalibrationError: the corners fit no camera, or lie where the wanted lens cannot see.
     """
     coefficients = lens.free if coefficients is None else coefficients
     if lens.chart is GNOMONIC and bases.pinhole is not None and bases.pinhole_fits:

@@ -38,7 +38,7 @@ HOPELESS_RATIO = 1e3
 class LeaveOneOut:
     """What leaving each view out does.
 
-    Args:
+    Attributes:
         changes: (m,q) of what views share (linearised.py has the order), from the full fit to the one without
             view j; NaN where the other views cannot tell.
         residuals: (m,2p) of view j by the fit without it, pixels, predicted minus detected, not weighted, its

@@ -39,7 +39,7 @@ SPACE = 3
 class ResidualSlopes:
     """How the residuals of m views of p corners move, not weighted; 0 where a corner was not seen.
 
-    Args:
+    Attributes:
         camera: (m,k,2p) by the camera's named parameters.
         pose: (m,6,2p) by the pose of the view.
         spline: (m,p,g) value of each spline of the lens's displacement at each corner; g = 0 for a formula.
@@ -66,7 +66,7 @@ class ResidualSlopes:
 class Linearised:
     """A finished fit at its estimate.
 
-    Args:
+    Attributes:
         camera: where the fit ended.
         names: of the camera's k parameters that moved.
         slopes: of the residuals.

@@ -50,7 +50,7 @@ THIN_SHARE = 1e-6
 class Scatter:
     """What is known of how far a camera is from the true one, to first order.
 
-    Args:
+    Attributes:
         camera: where its fit ended.
         names: of its k parameters that moved; the displacement's coefficients, along x and then along y, come
             after them.

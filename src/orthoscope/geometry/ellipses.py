@@ -25,7 +25,7 @@ FEWEST_POINTS = 5
 class Ellipses(NamedTuple):
     """Several ellipses; NaN where there is none.
 
-    Args:
+    Attributes:
         centres: (n,2).
         axes: (n,2,2) maps the unit circle about 0 onto each, moved to 0; symmetric.
     """

@@ -43,7 +43,8 @@ WIDEST_ANGLE = np.deg2rad(75.0)
 class Intrinsics:
     """The pin-hole, pixels: u = fx x + skew y + cx, v = fy y + cy.
 
-    Raises InputError where a focal length is not positive or a number is not finite.
+    Raises:
+        InputError: a focal length is not positive or a number is not finite.
     """
 
     fx: float
@@ -102,9 +103,12 @@ class Intrinsics:
 class Camera:
     """A calibrated camera.
 
-    image_size: (width, height). lens_frame: intrinsics of the lens's own plane where its distortion centre is
-    not the principal point; None means the intrinsics themselves. Raises InputError for an image without
-    size.
+    Attributes:
+        image_size: (width, height).
+        lens_frame: intrinsics of the lens's own plane where its distortion centre is not the principal point;
+            None means the intrinsics themselves.
+    Raises:
+        InputError: an image without size.
     """
 
     image_size: tuple[int, int]
@@ -322,9 +326,11 @@ class Camera:
         """For each pixel of the straight image, where to look in the photograph: x and y, float32 as
         cv2.remap takes them.
 
-        straight, size: intrinsics and (width, height) of the straight image, by default this camera's. NaN
-        where a ray lies beyond the lens's domain or its image outside the photograph by more than a pixel, so
-        that nothing folds back.
+        NaN where a ray lies beyond the lens's domain or its image outside the photograph by more than a
+        pixel, so that nothing folds back.
+
+        Args:
+            straight, size: intrinsics and (width, height) of the straight image, by default this camera's.
         """
         size, pin_hole = size or self.image_size, straight or self.intrinsics
 

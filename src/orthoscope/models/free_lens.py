@@ -33,7 +33,8 @@ class FreeLens(Lens):
     """A formula, `base`, and a displacement of its distorted plane by bicubic splines, `over`; named
     coefficients are the formula's.
 
-    Raises InputError where the base is a free lens itself.
+    Raises:
+        InputError: the base is a free lens itself.
     """
 
     base: Lens

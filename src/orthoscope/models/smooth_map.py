@@ -73,9 +73,11 @@ def smooth_map(
     """x and y of what `look` says of each pixel of an image of `size` (width, height), float32, to within
     TOLERANCE_PX and rounding.
 
-    look: pixels (n,2) to places (n,2), NaN where there are none. vouched: of pixels (n,2), whether `look` is
-    smooth there; where it is at the corners of a rectangle it must be all over it. limits: (width, height) of
-    what is looked at; places farther out than a pixel are NaN.
+    Args:
+        look: pixels (n,2) to places (n,2), NaN where there are none.
+        vouched: of pixels (n,2), whether `look` is smooth there; where it is at the corners of a rectangle it
+            must be all over it.
+        limits: (width, height) of what is looked at; places farther out than a pixel are NaN.
     """
     (width, height), seen = size, np.array(limits, dtype=float)
     within = _Limits(0.5 * (seen - 1.0), 0.5 * (seen + 1.0))

@@ -45,7 +45,10 @@ TEXT_SIZE = 9.0
 def nce_figure(curves: Curves, *, level: str, even: bool = False, height: float = 4.0) -> Figure:
     """Training and test NCE against the level.
 
-    level: the axis's words, with unit.  even: levels at equal distances, whatever they are.  height: inches.
+    Args:
+        level: the axis's words, with unit.
+        even: levels at equal distances, whatever they are.
+        height: inches.
     """
     figure = Figure(figsize=(FIGURE_WIDTH, height))
     left, right = figure.subplots(1, 2, sharey=True)

@@ -24,7 +24,7 @@ LOOKS = {
 class Headline(NamedTuple):
     """The verdict as the page opens with it.
 
-    Args:
+    Attributes:
         grade: a word or two.
         look: the class of its colours.
         sign: beside the word, for those who do not see the colour.

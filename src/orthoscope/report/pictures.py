@@ -45,7 +45,7 @@ QUALITIES = (
 class Pictures:
     """What is shown of photographs, as data URIs.
 
-    Args:
+    Attributes:
         small: by the view's name.
         large: the view's name, the photograph and the same without distortion; None where there is none.
     """

@@ -27,7 +27,7 @@ OWN = 'import orthoscope\n\ncamera = orthoscope.load_camera("calibration.json")\
 class Snippet(NamedTuple):
     """A text to copy.
 
-    Args:
+    Attributes:
         tool: whose it is.
         text: what to copy.
         remark: what it costs, or why there is none; may be empty.

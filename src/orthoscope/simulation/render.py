@@ -48,7 +48,7 @@ MID_GREY_LEVEL = 128.0
 class Renderer:
     """A camera ready to photograph: what is the same in every photograph is computed once.
 
-    Args:
+    Attributes:
         camera: which takes them.
         oversampling: sub-samples along a pixel's side where an edge crosses it.
         blur_px: sigma of the blur, pixels.

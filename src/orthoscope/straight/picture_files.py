@@ -33,7 +33,7 @@ JPEG_QUALITY = 95
 class PictureFile(NamedTuple):
     """A picture and the file that it came in.
 
-    Args:
+    Attributes:
         pixels: (h,w) or (h,w,c), blue, green, red and perhaps alpha, in the file's own depth; as the sensor
             has them.
         content: the whole file.

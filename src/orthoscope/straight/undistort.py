@@ -72,8 +72,10 @@ class Straightener:
     def __call__(self, image: ndarray, *, reuse: bool = False) -> ndarray:
         """The straight picture of a photograph (h,w) or (h,w,c), any depth, of the view's size.
 
-        reuse: where this thread's next picture may overwrite this one, whose memory then serves for all.
-        Raises InputError where the photograph is not of the camera's size.
+        Args:
+            reuse: where this thread's next picture may overwrite this one, whose memory then serves for all.
+        Raises:
+            InputError: the photograph is not of the camera's size.
         """
         size = (image.shape[1], image.shape[0])
         if size != tuple(self.camera.image_size):
@@ -177,7 +179,11 @@ def _straighten(straightener: Straightener, path: Path, place: Path) -> str | No
 
 
 def _check_names(photographs: list[Path]) -> None:
-    """Raises InputError where two photographs would be written to one file."""
+    """Check that each photograph would be written to a file of its own.
+
+    Raises:
+        InputError: two would be written to one.
+    """
     first: dict[str, Path] = {}
     for path in photographs:
         if path.name in first:

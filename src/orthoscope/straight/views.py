@@ -31,7 +31,7 @@ SHARE_GRID = (64, 48)
 class Panorama:
     """A camera whose picture is a part of a cylinder or of a sphere, unrolled.
 
-    Args:
+    Attributes:
         image_size: (width, height).
         intrinsics: pixels of a place, angle across and height up the cylinder or angle up the sphere.
         upright: whether it is a sphere's, with angles both ways.
@@ -66,7 +66,7 @@ View = Camera | Panorama
 class Projection(NamedTuple):
     """How rays are shown.
 
-    Args:
+    Attributes:
         view: the camera of a size and a pin-hole.
         farthest: the largest angle from the axis that is kept, radians, unless one asks for more.
     """

@@ -25,12 +25,13 @@ __all__ = ["Board"]
 class Board(ABC):
     """One kind of target.
 
-    Args:
+    Attributes:
         kind: the word that its descriptions begin with.
         form: what comes after it.
         example: a whole description.
         counted: what a person has to count, in a few words.
         advice: what to look at where no photograph shows it.
+        row_by_row: whether ids follow the lattice's rows.
     """
 
     kind: ClassVar[str]
@@ -38,6 +39,7 @@ class Board(ABC):
     example: ClassVar[str]
     counted: ClassVar[str]
     advice: ClassVar[str]
+    row_by_row: ClassVar[bool] = True
 
     @classmethod
     @abstractmethod
@@ -60,7 +62,7 @@ class Board(ABC):
 
     @abstractmethod
     def points(self) -> Float[ndarray, "m 3"]:
-        """Where the corners are: metres, target frame, z = 0, row by row."""
+        """Where the corners are: metres, target frame, z = 0, in the order of their ids."""
 
     @abstractmethod
     def drawing(self) -> Drawing:

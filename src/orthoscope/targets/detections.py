@@ -14,7 +14,7 @@ import numpy as np
 from orthoscope.geometry.arrays import InputError, frozen, ndarray
 from orthoscope.targets.target import Target
 
-__all__ = ["Detections", "Outlier", "SetAside", "View", "photograph_of", "view_name"]
+__all__ = ["Detections", "Outlier", "Remark", "SetAside", "View", "photograph_of", "view_name"]
 
 # What stands between a photograph's name and the number of the target, where it shows several.
 BOARD = ":board"
@@ -71,6 +71,18 @@ class SetAside(NamedTuple):
     reason: str
 
 
+class Remark(NamedTuple):
+    """What a person should know of how a photograph was seen, though it takes part.
+
+    Attributes:
+        image: the photograph's name.
+        words: a sentence without its full stop.
+    """
+
+    image: str
+    words: str
+
+
 class Outlier(NamedTuple):
     """A corner that was found but takes no part, and why.
 
@@ -98,6 +110,7 @@ class Detections:
         set_aside: photographs without a view, with the reason.
         outliers: corners that were found and are in no view, with the reason.
         disc_centres: whether discs' pixels are where centres are seen, not the centres of outlines.
+        remarks: what to know of how photographs were seen.
     Raises:
         InputError: a repeated image name, a corner that the target does not have, or corners of two of its
             members in one view.
@@ -109,6 +122,7 @@ class Detections:
     set_aside: tuple[SetAside, ...] = ()
     outliers: tuple[Outlier, ...] = ()
     disc_centres: bool = False
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         width, height = (int(side) for side in self.image_size)
@@ -118,6 +132,7 @@ class Detections:
         object.__setattr__(self, "views", tuple(self.views))
         object.__setattr__(self, "set_aside", tuple(SetAside(*entry) for entry in self.set_aside))
         object.__setattr__(self, "outliers", tuple(Outlier(*entry) for entry in self.outliers))
+        object.__setattr__(self, "remarks", tuple(Remark(*entry) for entry in self.remarks))
         seen: set[str] = set()
         for view in self.views:
             if view.image in seen:

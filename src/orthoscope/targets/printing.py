@@ -62,10 +62,11 @@ class Text(NamedTuple):
 class Page(NamedTuple):
     """A sheet of paper.
 
-    Args:
+    Attributes:
         width, height: mm.
         rectangles: (n,4) mm, x and y of one corner, then of the opposite one.
         discs: (k,3) mm, centre and radius.
+        holes: (h,3) mm, white ones inside rectangles.
         texts: what is written.
     """
 
@@ -73,6 +74,7 @@ class Page(NamedTuple):
     height: float
     rectangles: Float[ndarray, "n 4"]
     discs: Float[ndarray, "k 3"]
+    holes: Float[ndarray, "h 3"]
     texts: tuple[Text, ...]
 
 
@@ -100,6 +102,7 @@ def page_of(target: Target, *, paper: str | None = None) -> Page:
         height,
         np.concatenate([drawing.rectangles * 1e3 + np.tile(step, 2), ruler]),
         drawing.discs * 1e3 + np.array([*step, 0.0]),
+        drawing.holes * 1e3 + np.array([*step, 0.0]),
         (mark, words),
     )
 
@@ -146,7 +149,11 @@ def svg(page: Page) -> bytes:
     """The page as SVG, its unit a millimetre."""
     boxes = page.rectangles
     path = "".join(f"M{_f(a)} {_f(b)}H{_f(c)}V{_f(d)}H{_f(a)}Z" for a, b, c, d in boxes)
-    discs = "".join(f'<circle cx="{_f(x)}" cy="{_f(y)}" r="{_f(r)}"/>' for x, y, r in page.discs)
+    discs = "".join(
+        f'<circle cx="{_f(x)}" cy="{_f(y)}" r="{_f(r)}"{fill}/>'
+        for some, fill in ((page.discs, ""), (page.holes, ' fill="#fff"'))
+        for x, y, r in some
+    )
     texts = "".join(
         f'<text x="{_f(x)}" y="{_f(y)}" font-family="Helvetica, Arial, sans-serif" font-size="{TEXT_MM:g}">'
         f"{escape(words)}</text>"
@@ -168,6 +175,7 @@ def pdf(page: Page) -> bytes:
     marks += [f"{_f(a)} {_f(b)} {_f(c - a)} {_f(d - b)} re" for a, b, c, d in page.rectangles]
     marks.append("f")
     marks += [_pdf_disc(*disc) for disc in page.discs]
+    marks += ["1 g", *(_pdf_disc(*disc) for disc in page.holes), "0 g"] if len(page.holes) else []
     for x, y, words in page.texts:
         plain = words.encode("latin-1", "replace").decode("latin-1")
         plain = re.sub(r"([\\()])", r"\\\1", plain)
@@ -205,15 +213,18 @@ def _pdf_disc(x: float, y: float, r: float) -> str:
 
 
 def dxf(page: Page) -> bytes:
-    """The page as DXF R12: black rectangles as SOLID, discs as CIRCLE, millimetres, y upwards."""
+    """The page as DXF R12: black rectangles as SOLID, discs as CIRCLE (white ones on a layer `white`),
+    millimetres, y upwards.
+    """
     lines: list[object] = [0, "SECTION", 2, "ENTITIES"]
     for a, b, c, d in page.rectangles:
         top, bottom = page.height - b, page.height - d
         lines += [0, "SOLID", 8, "black"]
         for i, (x, y) in enumerate(((a, bottom), (c, bottom), (a, top), (c, top))):
             lines += [10 + i, _f(x), 20 + i, _f(y), 30 + i, "0"]
-    for x, y, r in page.discs:
-        lines += [0, "CIRCLE", 8, "black", 10, _f(x), 20, _f(page.height - y), 30, "0", 40, _f(r)]
+    layers = [("black", *disc) for disc in page.discs] + [("white", *disc) for disc in page.holes]
+    for layer, x, y, r in layers:
+        lines += [0, "CIRCLE", 8, layer, 10, _f(x), 20, _f(page.height - y), 30, "0", 40, _f(r)]
     for x, y, words in page.texts:
         lines += [
             0,
@@ -243,10 +254,11 @@ def png(page: Page) -> bytes:
     picture = np.full((round(page.height * dots), round(page.width * dots)), 255, np.uint8)
     for a, b, c, d in np.rint(page.rectangles * dots).astype(int):
         picture[min(b, d) : max(b, d), min(a, c) : max(a, c)] = 0
-    for x, y, r in page.discs * dots:
+    rounds = [(0, disc) for disc in page.discs * dots] + [(255, disc) for disc in page.holes * dots]
+    for level, (x, y, r) in rounds:
         rows, columns = np.mgrid[int(y - r) - 1 : int(y + r) + 2, int(x - r) - 1 : int(x + r) + 2]
         inside = (rows + 0.5 - y) ** 2 + (columns + 0.5 - x) ** 2 <= r * r
-        picture[rows[inside], columns[inside]] = 0
+        picture[rows[inside], columns[inside]] = level
     for x, y, words in page.texts:
         place = (round(x * dots), round(y * dots))
         cv2.putText(

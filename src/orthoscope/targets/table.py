@@ -11,12 +11,16 @@ from orthoscope.targets.board import Board
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.circles import Circles
+from orthoscope.targets.grid_board import GridBoard
 from orthoscope.targets.kalibr_target import kalibr_target
+from orthoscope.targets.marked_chessboard import MarkedChessboard
 from orthoscope.targets.target import TOGETHER, Target, several, target_of
 
 __all__ = ["TARGETS", "as_fields", "forms", "parse_target"]
 
-TARGETS: dict[str, type[Board]] = {board.kind: board for board in (Chessboard, Charuco, AprilGrid, Circles)}
+TARGETS: dict[str, type[Board]] = {
+    board.kind: board for board in (Chessboard, MarkedChessboard, Charuco, AprilGrid, GridBoard, Circles)
+}
 
 
 def forms() -> str:

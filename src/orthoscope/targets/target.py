@@ -34,7 +34,7 @@ GAP = 0.5
 class Target:
     """A flat calibration target: where its corners nominally are.
 
-    Args:
+    Attributes:
         name: how it is asked for, such as `chessboard:9x6:25mm`.
         points: (m,3) metres, target frame, z = 0.
         lines: ids of the corners of each row and each column, in order.
@@ -132,7 +132,9 @@ class Target:
 
 def target_of(board: Board) -> Target:
     """The target that a board describes, corners where it is drawn."""
-    return Target(board.description, board.points(), board.lines(), board.grid, board)
+    return Target(
+        board.description, board.points(), board.lines(), board.grid if board.row_by_row else None, board
+    )
 
 
 def several(targets: Sequence[Target]) -> Target:
@@ -160,7 +162,11 @@ def several(targets: Sequence[Target]) -> Target:
 
 
 def _check_apart(members: Sequence[Target]) -> None:
-    """Raises InputError where a photograph could not tell two targets apart."""
+    """Check that a photograph could tell the targets apart.
+
+    Raises:
+        InputError: it could not tell two of them.
+    """
     for i, member in enumerate(members):
         for other in members[:i]:
             if member.board and other.board and member.board.mistaken_for(other.board):

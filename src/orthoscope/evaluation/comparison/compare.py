@@ -43,7 +43,7 @@ Progress = Callable[[int, int, str], None]
 class Standing:
     """How an entry did; NaN where it could not be judged, and `failure` says why.
 
-    Args:
+    Attributes:
         entry: the method with its settings.
         squares: (m,) of each view the sum of squared held-out residuals, px^2.
         camera, target_shape: calibrated from all views; None where they tell no camera.

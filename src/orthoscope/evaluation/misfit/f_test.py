@@ -39,10 +39,15 @@ ALL_SIGNS_VIEWS = 11
 class MisfitTest:
     """Whether residuals agree from view to view, and by how much.
 
-    f, between, within: F and its degrees of freedom; chance: the F that these residuals have without any
-    agreement between views. p_value: of F for independent normal noise; p_over_views: for any noise that
-    differs from view to view. systematic_px: the part that agrees, noise_px: the part that does not, both rms
-    per point. NaN where the views do not suffice for a test.
+    NaN where the views do not suffice for a test.
+
+    Attributes:
+        f, between, within: F and its degrees of freedom.
+        chance: the F that these residuals have without any agreement between views.
+        p_value: of F for independent normal noise.
+        p_over_views: for any noise that differs from view to view.
+        systematic_px: the part that agrees, rms per point.
+        noise_px: the part that does not, rms per point.
     """
 
     f: float
@@ -76,7 +81,9 @@ def agreement(columns: Columns, whole: Whitening, tested: tuple[int, ...]) -> Ag
     """Test blocks of columns with the other blocks, and the poses, granted; NaN, and unknowns 0, where the
     views do not suffice.
 
-    whole: of all the columns' gram matrix.  tested: numbers of the blocks, side by side.
+    Args:
+        whole: of all the columns' gram matrix.
+        tested: numbers of the blocks, side by side.
     """
     granted = [i for i in range(len(columns.blocks)) if i not in tested]
     A, B = (np.concatenate([columns.places[i] for i in blocks]) for blocks in (granted, tested))

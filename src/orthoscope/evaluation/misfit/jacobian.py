@@ -27,9 +27,13 @@ FRAME_NAMES = ("frame_fx", "frame_fy", "centre_x", "centre_y")
 class Slopes(NamedTuple):
     """One row for each corner that has an image, all views together.
 
-    view, corner: which view, which row of the target's points. pixels: detected. residual: (n,2) pixels.
-    by_camera: (n,2,k), by `parameters_of`. by_pose: (n,2,6). by_place: (n,2,3) pixels per metre, of the
-    corner in the target.
+    Attributes:
+        view, corner: which view, which row of the target's points.
+        pixels: detected.
+        residual: (n,2) pixels.
+        by_camera: (n,2,k), by `parameters_of`.
+        by_pose: (n,2,6).
+        by_place: (n,2,3) pixels per metre, of the corner in the target.
     """
 
     view: Int[ndarray, " n"]

@@ -81,11 +81,14 @@ CLIP_RATIO = 5.0
 class TargetMisfit:
     """The target against its description.
 
-    displacements: (m,3) metres, target frame, where the corners seem to be minus where they are said to be,
-    as far as that is no noise and neither shift, turn nor size of the whole; NaN for a corner that was not
-    seen. pixels_per_metre: of the typical view. moves_camera_px: how far the camera's image would move if the
-    corners were there (after a rotation, rms over the detected corners, to first order); rather too small,
-    since noise hides part of the displacements.
+    Attributes:
+        displacements: (m,3) metres, target frame, where the corners seem to be minus where they are said to
+            be, as far as that is no noise and neither shift, turn nor size of the whole; NaN for a corner
+            that was not seen.
+        pixels_per_metre: of the typical view.
+        moves_camera_px: how far the camera's image would move if the corners were there (after a rotation,
+            rms over the detected corners, to first order); rather too small, since noise hides part of the
+            displacements.
     """
 
     test: MisfitTest
@@ -98,8 +101,9 @@ class TargetMisfit:
 class LensMisfit:
     """The lens against its formula.
 
-    residuals: (rows, columns, 2) pixels, predicted minus detected, what the views agree on in each cell, as
-    far as that is no noise; NaN for a cell without corners.
+    Attributes:
+        residuals: (rows, columns, 2) pixels, predicted minus detected, what the views agree on in each cell,
+            as far as that is no noise; NaN for a cell without corners.
     """
 
     test: MisfitTest

@@ -23,7 +23,7 @@ USUAL_WIDTH = 1000.0
 class Situation:
     """The facts.
 
-    Args:
+    Attributes:
         method, lens, base, first_lens: what the calibration was made by, as it is called again; empty
             where it has no such setting.
         shape: of the target, that it came to.

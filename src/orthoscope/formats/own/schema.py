@@ -29,7 +29,7 @@ from orthoscope.models.target_shape import TargetShape
 from orthoscope.simulation.scene import Scene
 from orthoscope.targets.board import Board
 from orthoscope.targets.chessboard import Chessboard
-from orthoscope.targets.detections import Detections, Outlier, SetAside, View
+from orthoscope.targets.detections import Detections, Outlier, Remark, SetAside, View
 from orthoscope.targets.table import TARGETS, as_fields
 from orthoscope.targets.target import Target, several
 
@@ -94,6 +94,7 @@ class DetectionsFile(FileStruct):
     set_aside: list[tuple[str, str]] = []
     outliers: list[tuple[str, int, tuple[float, float], str]] = []
     disc_centres: bool = False
+    remarks: list[tuple[str, str]] = []
 
     @classmethod
     def of(cls, detections: Detections) -> DetectionsFile:
@@ -104,6 +105,7 @@ class DetectionsFile(FileStruct):
             [(image, reason) for image, reason in detections.set_aside],
             [(image, corner, pixel, reason) for image, corner, pixel, reason in detections.outliers],
             detections.disc_centres,
+            [(image, words) for image, words in detections.remarks],
         )
 
     def core(self) -> Detections:
@@ -112,7 +114,10 @@ class DetectionsFile(FileStruct):
             tuple(SetAside(*entry) for entry in self.set_aside),
             tuple(Outlier(*entry) for entry in self.outliers),
         )
-        return Detections(self.target.core(), self.image_size, views, aside, outliers, self.disc_centres)
+        remarks = tuple(Remark(*entry) for entry in self.remarks)
+        return Detections(
+            self.target.core(), self.image_size, views, aside, outliers, self.disc_centres, remarks
+        )
 
 
 class IntrinsicsFile(FileStruct, omit_defaults=False):

@@ -37,8 +37,11 @@ JOINT, PAIRS = "joint", "pairs"
 class Model(NamedTuple):
     """One way to explain the photographs.
 
-    base: a formula.  shape: the kind of the target's. first_lens: `free` or `formula`, the lens of step 1.
-    formula: fitted to the pairs of step 1; None where step 1's camera is taken as it is.
+    Attributes:
+        base: a formula.
+        shape: the kind of the target's.
+        first_lens: `free` or `formula`, the lens of step 1.
+        formula: fitted to the pairs of step 1; None where step 1's camera is taken as it is.
     """
 
     base: str
@@ -65,7 +68,9 @@ class Model(NamedTuple):
 class Candidates:
     """Models fitted to the same photographs, each when it is asked for, and once.
 
-    detections: views that belong.  skew: whether K has one.
+    Args:
+        detections: views that belong.
+        skew: whether K has one.
     """
 
     def __init__(self, detections: Detections, *, skew: bool) -> None:
@@ -87,7 +92,8 @@ class Candidates:
     def residuals(self, model: Model) -> Float[ndarray, "m n"]:
         """Of each view by the model without it, as in `LeaveOneOut`.
 
-        Raises CalibrationError where the model cannot be fitted.
+        Raises:
+            CalibrationError: the model cannot be fitted.
         """
         if model.formula:
             return self.from_pairs(model).residuals
@@ -103,7 +109,8 @@ class Candidates:
     def camera(self, model: Model) -> tuple[Camera, tuple[str, ...]]:
         """The model's camera, and the names of its parameters that were fitted.
 
-        Raises CalibrationError where the views cannot tell them.
+        Raises:
+            CalibrationError: the views cannot tell them.
         """
         fit = self.step_one(model.step_one)
         return (

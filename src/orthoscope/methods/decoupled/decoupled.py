@@ -122,7 +122,8 @@ def decoupled(
 def _open(lens: str, shape: str, base: str, first_lens: str, fit: str, formulas: Sequence[str]) -> _Open:
     """What the settings leave open.
 
-    Raises InputError for a setting that is none, or for two that contradict each other.
+    Raises:
+        InputError: a setting is none, or two contradict each other.
     """
     if shape not in (AUTO, *SHAPES):
         raise InputError(f"target shape {shape!r} is not known; expected one of {AUTO}, {', '.join(SHAPES)}.")
@@ -168,7 +169,8 @@ def _chosen(
 ) -> tuple[Model, tuple[Candidate, ...]]:
     """The base by the richest model on it; then the target's shape and the lens of step 1; then the formula.
 
-    Raises CalibrationError where no base can be fitted.
+    Raises:
+        CalibrationError: no base can be fitted.
     """
     corners = np.array([len(view.ids) for view in candidates.detections.views], dtype=float)
     tried: dict[Model, Contender] = {}

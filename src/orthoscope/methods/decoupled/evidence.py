@@ -53,8 +53,10 @@ class Evidence:
     """Variances: noise, px^2 of a coordinate; surface (2,) in the plane and across, singles (3,), metres^2;
     bend, of the lens's plane.
 
-    size: of the target, metres. likeness: of errors within a view, 1 or more. parameters: how many the data
-    determined, poses left out.
+    Attributes:
+        size: of the target, metres.
+        likeness: of errors within a view, 1 or more.
+        parameters: how many the data determined, poses left out.
     """
 
     noise: float

@@ -46,7 +46,8 @@ class Contender:
     """A model with the sum of squared held-out residuals of each view (m,), px^2; NaN where the others could
     not tell.
 
-    base, target, lens, fit: as in `Candidate`.
+    Attributes:
+        base, target, lens, fit: as in `Candidate`.
     """
 
     base: str
@@ -60,7 +61,8 @@ def simplest_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " 
     """The index of the first contender that loses no more than one standard error against the best;
     contenders come simplest first.
 
-    corners: of each view.
+    Args:
+        corners: of each view.
     """
     return _first_within(contenders, corners, ABOUT_ERRORS, np.inf)
 
@@ -69,7 +71,8 @@ def first_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " m"]
     """The index of the first contender that loses little against the best, and not surely; contenders come in
     order of preference.
 
-    corners: of each view.
+    Args:
+        corners: of each view.
     """
     return _first_within(contenders, corners, SURE_ERRORS, LITTLE_LOGARITHM)
 
@@ -78,7 +81,8 @@ def richest_unless_worse(contenders: Sequence[Contender], corners: Float[ndarray
     """The index of the last contender, or of the best where that one gains more than two standard errors;
     contenders come simplest first.
 
-    corners: of each view.
+    Args:
+        corners: of each view.
     """
     able = _able(contenders)
     if not able:

@@ -63,7 +63,9 @@ class Known(NamedTuple):
     """Posterior covariance over sigma^2: of the camera's k parameters; the share of each prior's unknowns
     that the data determined.
 
-    spline: a number out of its unknowns.  surface (r,3), singles (p,3): each between 0 and 1.
+    Attributes:
+        spline: a number out of its unknowns.
+        surface (r,3), singles (p,3): each between 0 and 1.
     """
 
     camera: ndarray
@@ -75,9 +77,12 @@ class Known(NamedTuple):
 class Joint:
     """The problem for given measurements.
 
-    points: (p,3) nominal corners. surface: (p,r) what its coefficients multiply. energy: (g,g) of the
-    displacement, or none. single: whether corners have displacements of their own. parts: which corners are
-    of one body.
+    Args:
+        points: (p,3) nominal corners.
+        surface: (p,r) what its coefficients multiply.
+        energy: (g,g) of the displacement, or none.
+        single: whether corners have displacements of their own.
+        parts: which corners are of one body.
     """
 
     def __init__(

@@ -55,7 +55,9 @@ class StepOneFit:
     """What came out: the kind of the target's shape, the problem with its last weights, the estimate and what
     it speaks for.
 
-    covariance: (k,k) of the free parameters.  steps, status: of the solver.
+    Attributes:
+        covariance: (k,k) of the free parameters.
+        steps, status: of the solver.
     """
 
     target: str

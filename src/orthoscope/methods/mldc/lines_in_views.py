@@ -23,8 +23,10 @@ FEWEST_CORNERS = 3
 class SeenLines(NamedTuple):
     """Lines with at least FEWEST_CORNERS seen corners, padded to one length.
 
-    row: (l,) of the observations' table. column: (l, w) of the table, its corners in the target's order.
-    present: (l, w); padding comes last, its column is 0.
+    Attributes:
+        row: (l,) of the observations' table.
+        column: (l, w) of the table, its corners in the target's order.
+        present: (l, w); padding comes last, its column is 0.
     """
 
     row: Int[ndarray, " l"]
@@ -35,7 +37,8 @@ class SeenLines(NamedTuple):
     def of(cls, observations: Observations, target: Target) -> Self:
         """The lines of every view.
 
-        Raises CalibrationError where no view shows FEWEST_CORNERS corners of a line.
+        Raises:
+            CalibrationError: no view shows FEWEST_CORNERS corners of a line.
         """
         on_line = _padded(target.lines, len(target.points))
         column = _column_of(observations, len(target.points))[

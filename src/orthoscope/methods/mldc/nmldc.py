@@ -136,7 +136,11 @@ def nmldc(
 
 
 def _check_sees(camera: Camera, camera_from_target: Sequence[Pose], detections: Detections) -> None:
-    """Raises CalibrationError where the lens has no image of corners that it was to be fitted to."""
+    """Check that the lens has an image of all corners that it was to be fitted to.
+
+    Raises:
+        CalibrationError: it has none of some.
+    """
     residuals = np.concatenate(residuals_of(camera, camera_from_target, detections))
     if lost := int(np.isnan(residuals[:, 0]).sum()):
         raise CalibrationError(
@@ -150,7 +154,8 @@ def _within_reach(detections: Detections, own: Camera) -> Detections:
     """The corners that a straight image can hold: within WIDEST_ANGLE of the lens's axis. Views that have too
     few of them are set aside.
 
-    Raises CalibrationError where no view is left.
+    Raises:
+        CalibrationError: no view is left.
     """
 
     def kept(view: View) -> View:
@@ -175,7 +180,8 @@ def _bases(
 ) -> StartingCameras:
     """The corners as the lens's own camera would see them without its lens, ready for the pin-hole.
 
-    fallback: the camera for corners that the first does not reach.
+    Args:
+        fallback: the camera for corners that the first does not reach.
     """
 
     def straight(view: View) -> View:
