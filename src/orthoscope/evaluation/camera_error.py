@@ -4,9 +4,10 @@ The *camera error* at a place is the distance in pixels between this camera's im
 true camera's, a turn of the camera fitted out (a turn and a shift for things at the target's distance).
 Nobody knows the true camera; what is predicted is the root mean square of that distance,
 
-    E^2 = max(alike, jackknife + prior) + bias^2,
+    E^2 = max(alike, views) + bias^2,    views = (n (jackknife + prior) + alike) / (n + 1),
 
-the larger of two variances (scatter.py: errors alike within a view; views left out), and for a camera that
+the larger of two variances (scatter.py: errors alike within a view; views left out), the second of which few
+views know so badly, as n independent draws, that the first counts for one more; and for a camera that
 follows a formula, or takes its target for flat, its squared difference to the richest model beyond what
 chance makes of it:
 
@@ -35,6 +36,8 @@ __all__ = ["CameraError", "picked", "predicted_error", "rms_difference", "seen_p
 
 # So many corners stand for all that were seen.
 PLACE_COUNT = 240
+# Beside the jackknife, what errors alike within views say of the variance counts as so many draws.
+ALIKE_DRAWS = 1.0
 # The map has so many columns.
 MAP_COLUMNS = 28
 # The map has so many rows.
@@ -113,6 +116,8 @@ class _Variances:
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
         self.moved = (by_view**2).sum(1)  # (n, m)
         self.views = np.nansum(self.moved, axis=1) + _spread(slopes, scatter.prior)
+        draws = _effective_draws(np.nansum(self.moved[:fitted], axis=0))
+        self.views = (draws * self.views + ALIKE_DRAWS * self.alike) / (draws + ALIKE_DRAWS)
         self.bias = np.zeros(len(rays))
         if rich is not None:
             apart = difference_of_images(rich.camera, scatter.camera, rays, rays[:fitted], distance=distance)
@@ -223,6 +228,15 @@ def _settled(
         motion[:fitted].reshape(2 * fitted, -1), slopes[:fitted].reshape(2 * fitted, -1), rcond=None
     )[0]
     return slopes - motion @ undone
+
+
+def _effective_draws(squares: Float[ndarray, " m"]) -> float:
+    """Of how many independent draws of one size a sum of squares is as sure (F. Satterthwaite, 1946).
+
+    Args:
+        squares: by each view left out; 0 where the others cannot tell.
+    """
+    return float(squares.sum() ** 2 / max((squares**2).sum(), 1e-300))
 
 
 def _spread(slopes: Float[ndarray, "n 2 d"], covariance: Float[ndarray, "d d"]) -> Float[ndarray, " n"]:
