@@ -87,7 +87,7 @@ def test_a_shift_undoes_less_where_the_target_stood_at_many_distances(noisy: Det
 
 
 def test_a_board_that_always_stands_upright_may_be_stretched_and_nobody_would_know():
-    """Its stretch is the pixels' aspect; boards that are turned in their plane tell the one from the other."""
+    """Its stretch is the pixels' aspect; boards turned in their plane tell the one from the other."""
 
     def scatter(**roll: tuple[float, float]) -> Scatter:
         return scattered(photographed_with(bowed(1e-3), NARROW, 8, noise_px=0.03, **roll), "free")
