@@ -33,6 +33,8 @@ __all__ = ["Evidence", "first_guess"]
 # of the target's size, the standard deviation of a printed corner to start from; its image, a pixel's tenth,
 # for a lens
 GUESS = 1e-3
+# Of GUESS: a variance that is smaller needs many rounds to grow.
+AWAKE = 0.03
 LEAST, MOST = 1e-6, 0.03  # of the target's size: the range of a standard deviation
 LEAST_BEND, MOST_BEND = 1e-8, 0.1  # of the unit of the distorted plane
 SETTLED = 0.01  # share by which noise and parameters may still change
@@ -66,6 +68,18 @@ class Evidence:
     def of(cls, variances: Variances) -> Evidence:
         """As a calibration kept it."""
         return cls(*variances)
+
+    def with_shape_of(self, other: Evidence) -> Evidence:
+        """With the variances of the target's shape that another fit found, but none so small that it could
+        not grow.
+        """
+        least = (AWAKE * GUESS * self.size) ** 2
+        surface, singles = np.maximum(other.surface, least), np.maximum(other.singles, least)
+        return replace(
+            self,
+            surface=(float(surface[0]), float(surface[1])),
+            singles=(float(singles[0]), float(singles[1]), float(singles[2])),
+        )
 
     def precisions(self, coefficients: int) -> Precisions:
         """What a problem with so many coefficients of the surface is to know."""

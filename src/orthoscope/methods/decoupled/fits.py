@@ -11,7 +11,8 @@ from orthoscope.fitting.fits import Fits, OwnFit, RichestFit
 from orthoscope.fitting.leave_one_out import leave_one_out
 from orthoscope.fitting.scatter import scatter_of
 from orthoscope.geometry.arrays import CalibrationError
-from orthoscope.methods.decoupled.candidates import PAIRS, Candidates, Model
+from orthoscope.methods.decoupled.candidates import Candidates
+from orthoscope.methods.decoupled.model import PAIRS, Model
 from orthoscope.methods.decoupled.step_one_linearised import linearised_flat
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import FREE, lens_name
