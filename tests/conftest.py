@@ -7,14 +7,22 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import jaxtyping
 import pytest
 from hypothesis import settings
-from jaxtyping import install_import_hook
 
-install_import_hook("orthoscope", "helpers.shapes.checked")  # before anything imports orthoscope
+from helpers.shapes import begin_test, sampled
+
+jaxtyping.jaxtyped = sampled  # which the hook puts on functions and classes
+jaxtyping.install_import_hook("orthoscope", "helpers.shapes.checked")  # before anything imports orthoscope
 
 settings.register_profile("orthoscope", deadline=None, derandomize=True, max_examples=30)
 settings.load_profile("orthoscope")
+
+
+def pytest_runtest_setup() -> None:
+    """Calls are counted from the start of each test."""
+    begin_test()
 
 
 @pytest.fixture(scope="session")

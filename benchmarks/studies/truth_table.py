@@ -247,6 +247,7 @@ def _row(written: dict[str, Any]) -> Row:
     facts = written["facts"]
     if facts:
         facts["groups"] = tuple(tuple(group) for group in facts["groups"])
+        facts["wild_in"] = tuple(facts.get("wild_in", ()))
         facts |= {name: tuple(tuple(pair) for pair in facts[name]) for name in ("suspects", "precious")}
     return Row(**{**written, "facts": facts, "grouped": written["grouped"] and tuple(written["grouped"])})
 

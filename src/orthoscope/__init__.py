@@ -19,6 +19,8 @@ from orthoscope.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from orthoscope.detection.detect import detect as detect
+    from orthoscope.evaluation.camera_check import CameraCheck as CameraCheck
+    from orthoscope.evaluation.camera_check import check_camera as check_camera
     from orthoscope.evaluation.comparison.compare import Comparison as Comparison
     from orthoscope.evaluation.comparison.compare import compare as compare
     from orthoscope.evaluation.evaluate import Evaluation as Evaluation
@@ -67,6 +69,7 @@ if TYPE_CHECKING:
 
 ROOMS = {
     "detection.detect": ("detect",),
+    "evaluation.camera_check": ("CameraCheck", "check_camera"),
     "evaluation.comparison.compare": ("Comparison", "compare"),
     "evaluation.evaluate": ("Evaluation", "UnseenError", "evaluate", "evaluate_on"),
     "evaluation.metrics": ("normalised_calibration_error",),

@@ -10,13 +10,15 @@ import threading
 import time
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from orthoscope.cli.executors import threads
 from orthoscope.formats.export import export
-from orthoscope.formats.own.json import save
+from orthoscope.formats.own.json import load, save
 from orthoscope.models.camera import Intrinsics
 from orthoscope.simulation.scene import simulate_detections
 from orthoscope.targets.detections import Detections, SetAside
@@ -123,23 +125,48 @@ def test_a_killed_worker_and_want_of_memory_leave_with_1(run, monkeypatch, error
     assert told.err.count("\n") == 1
 
 
-def test_comparing_a_camera_of_a_file_says_how_that_is_done(run, tmp_path):
+def test_a_file_that_is_not_there_is_no_camera_to_compare(run, tmp_path):
     told = run("compare", tmp_path, "--with", "camera_info.yaml", "-o", tmp_path / "out")
     assert told.code == 2
-    assert "orthoscope evaluate camera_info.yaml --on PHOTOS" in told.err
+    assert "'camera_info.yaml' is neither a method nor a file that is there" in told.err
 
 
-def test_another_programs_camera_has_a_verdict_on_photographs(run, scene, tmp_path):
-    save(simulate_detections(scene, noise_px=0.1, rng=np.random.default_rng(0)), tmp_path / "corners.json")
-    for focal, verdict in ((1.0, "Good: off by about 0.1"), (1.5, "Do not use this camera: off by about ")):
-        camera = replace(scene.camera, intrinsics=Intrinsics(520.0 * focal, 518.0 / focal, 324.0, 236.0))
+@pytest.fixture
+def corners(scene, tmp_path):
+    path = tmp_path / "corners.json"
+    save(simulate_detections(scene, noise_px=0.1, rng=np.random.default_rng(0)), path)
+    return path
+
+
+def test_another_programs_camera_has_a_verdict_on_photographs(run, scene, corners, tmp_path):
+    for focal, verdict in (
+        (1.0, "Good: the camera that these photographs give by themselves"),
+        (1.05, "Do not use this camera: "),
+    ):
+        camera = replace(scene.camera, intrinsics=Intrinsics(520.0 * focal, 518.0 * focal, 324.0, 236.0))
         export(camera, tmp_path / "camera.yaml", "opencv")
         told = run(
-            *("evaluate", tmp_path / "camera.yaml", "--on", tmp_path / "corners.json"),
-            *("--target", "chessboard:9x6:25mm"),
+            *("evaluate", tmp_path / "camera.yaml", "--on", corners, "--target", "chessboard:9x6:25mm")
         )
         assert told.code == 0, told.err
         assert told.out.startswith(f"verdict    {verdict}")
+        assert ("the focal length is 4.8 % shorter" in told.out) == (focal > 1.0)
+
+
+def test_another_programs_camera_is_compared_as_it_is(run, scene, corners, tmp_path):
+    """The true camera foresees all views by their noise alone; one of another focal length does not."""
+    for name, focal in (("true.yaml", 1.0), ("old.yaml", 1.05)):
+        camera = replace(scene.camera, intrinsics=Intrinsics(520.0 * focal, 518.0 * focal, 324.0, 236.0))
+        export(camera, tmp_path / name, "opencv")
+    told = run(
+        *("compare", corners, "-o", tmp_path / "out", "--with", "fccm:brown"),
+        *("--with", tmp_path / "true.yaml", "--with", tmp_path / "old.yaml"),
+    )
+    assert told.code == 0, told.err
+    standings = load(tmp_path / "out" / "comparison.json").standings
+    assert [Path(one.entry.name).name for one in standings] == ["true.yaml", "fccm:brown", "old.yaml"]
+    assert standings[0].entry.camera is not None
+    assert standings[0].held_out_px == pytest.approx(0.1 * np.sqrt(2.0), rel=0.1)
 
 
 def test_without_opencv_one_is_told_what_to_install(run, monkeypatch):
@@ -150,3 +177,13 @@ def test_without_opencv_one_is_told_what_to_install(run, monkeypatch):
     told = run("tools")
     assert told.code == 2
     assert "pip install 'orthoscope[opencv]'" in told.err
+
+
+def test_reasons_stand_one_below_the_other_and_names_stay_on_their_line(run, tmp_path):
+    for name in ("one.png", "two\x1b[2J.png"):
+        cv2.imwrite(str(tmp_path / name), np.full((60, 80), 90, np.uint8))
+    told = run("detect", tmp_path, "--target", "chessboard:9x6:25mm", "-o", tmp_path / "corners.json")
+    first, *listed = told.err.splitlines()[-3:]
+    assert told.code == 1
+    assert first.startswith("orthoscope: chessboard:9x6:25mm was found in none of 2 photographs")
+    assert [line.split(":")[0] for line in listed] == ["  one.png", "  two\\x1b[2J.png"]

@@ -28,7 +28,7 @@ def photographed(board: Circles, turn: tuple[float, float, float], distance: flo
     middle = 0.5 * (target.points.min(0) + target.points.max(0))
     pose = Pose(rotation, np.array([0.0, 0.0, distance]) - rotation @ middle)
     truth = CAMERA.project(pose.apply(target.points))
-    truth += disc_offsets(CAMERA, pose, target.points, target.disc_radius)
+    truth += disc_offsets(CAMERA, pose, target.points, target.disc_radii)
     return RENDERER.photograph(target, pose, rng=np.random.default_rng(0)), truth
 
 

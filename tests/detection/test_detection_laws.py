@@ -41,8 +41,8 @@ def seen(renderer: Renderer, target, pose: Pose, seed: int = 0):
     """What the detector sees in a photograph, and where corners, or the centres of outlines, truly are."""
     picture = renderer.photograph(target, pose, rng=np.random.default_rng(seed))
     truth = renderer.camera.project(pose.apply(target.points))
-    if target.disc_radius:
-        truth += disc_offsets(renderer.camera, pose, target.points, target.disc_radius)
+    if target.disc_radii.any():
+        truth += disc_offsets(renderer.camera, pose, target.points, target.disc_radii)
     return see(picture, target), truth
 
 

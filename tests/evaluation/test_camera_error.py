@@ -77,6 +77,14 @@ def test_the_prediction_is_in_the_pixels_that_the_camera_is_off(noisy: Detection
     assert predicted.near_seen_px < predicted.seen_px  # near the target a shift undoes more
 
 
+def test_a_shift_undoes_less_where_the_target_stood_at_many_distances(noisy: Detections):
+    scatter, where = scattered(noisy), places(noisy)
+    spread = 0.5 * np.exp(np.random.default_rng(0).uniform(-0.3, 0.3, len(where)))
+    one, many = (predicted_error(scatter, where, distance=to) for to in (0.5, spread))
+    assert one.near_seen_px < many.near_seen_px < many.seen_px
+    assert many.seen_px == one.seen_px
+
+
 @pytest.mark.slow
 def test_the_models_own_part_is_the_scatter_over_repeated_photographs():
     clean = photographed(NARROW, 10)

@@ -10,7 +10,7 @@ from orthoscope.evaluation.coverage import COVERAGE_GRID, corners_by_cell
 from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import WIDEST, Camera, Intrinsics
+from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import chessboard
@@ -105,11 +105,11 @@ def test_corners_that_no_straight_image_would_hold_are_left_out():
     turned = Pose(rotation_from_vector(np.array([0.0, 1.2, 0.0])), np.array([0.15, -0.06, 0.1]))
     pixels = camera.project(turned.apply(BOARD.points))
     angles = np.arccos(camera.unproject(pixels)[:, 2])
-    assert angles.min() < WIDEST < angles.max()
+    assert angles.min() < WIDEST_ANGLE < angles.max()
     estimated, observed = lateral_errors(
         camera, [turned], Detections(BOARD, (640, 480), (View("a", np.arange(54), pixels),))
     )
-    assert len(estimated) == len(observed) == (angles < WIDEST).sum()
+    assert len(estimated) == len(observed) == (angles < WIDEST_ANGLE).sum()
 
 
 def test_cells_share_the_frame_and_its_border_belongs_to_it():

@@ -29,13 +29,13 @@ def outlines_of(scene: Scene) -> Detections:
     """What a detector of outlines without noise sees."""
     exact = simulate_detections(scene, noise_px=0.0, rng=np.random.default_rng(0))
     poses = dict(zip(scene.images, scene.camera_from_target, strict=True))
-    radius = scene.target.disc_radius
+    radius = scene.target.disc_radii
     views = tuple(
         View(
             view.image,
             view.ids,
             view.pixels
-            + disc_offsets(scene.camera, poses[view.image], scene.target.points[view.ids], radius),
+            + disc_offsets(scene.camera, poses[view.image], scene.target.points[view.ids], radius[view.ids]),
         )
         for view in exact.views
     )
@@ -50,7 +50,7 @@ def scene() -> Scene:
 
 def test_the_offset_of_a_pin_hole_is_that_of_the_outlines_conic():
     pose = Pose(rotation_from_vector(np.array([0.5, -0.6, 0.2])), np.array([-0.05, -0.04, 0.4]))
-    points, radius = TARGET.points, TARGET.disc_radius
+    points, radius = TARGET.points, TARGET.disc_radii[0]
     centres = []
     for x, y, _ in points:  # the outline is the conic H^-T C H^-1; its centre is its polar of infinity
         disc = np.array([[1.0, 0.0, -x], [0.0, 1.0, -y], [-x, -y, x * x + y * y - radius**2]])
@@ -64,7 +64,7 @@ def test_the_offset_of_a_pin_hole_is_that_of_the_outlines_conic():
 
 def test_a_disc_face_on_in_a_pin_hole_has_no_offset():
     pose = Pose(np.eye(3), np.array([-0.05, -0.04, 0.4]))
-    assert_allclose(disc_offsets(PIN_HOLE, pose, TARGET.points, TARGET.disc_radius), 0.0, atol=1e-9)
+    assert_allclose(disc_offsets(PIN_HOLE, pose, TARGET.points, TARGET.disc_radii), 0.0, atol=1e-9)
 
 
 def test_correction_brings_outlines_back_to_the_discs_centres_whatever_end_they_are_listed_from(scene):

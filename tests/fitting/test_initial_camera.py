@@ -9,7 +9,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from helpers.scenes import BOARD, NARROW, WIDE, camera_with, facing, photographed, seen
-from orthoscope.fitting.initial_camera import FIELDS, Assumptions, StartingCameras, starts, suited_lens
+from orthoscope.fitting.initial_camera import (
+    FIELDS_OF_VIEW,
+    Assumptions,
+    StartingCameras,
+    starts,
+    suited_lens,
+)
 from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.models.camera import Camera, Intrinsics
@@ -42,7 +48,7 @@ def test_the_angle_base_is_near_for_any_field_of_view(field):
     assert (
         0.7 < angle.camera.intrinsics.fx / focal < 1.4
     )  # the fields that are tried grow by a third to a half, the narrow ones faster
-    assert np.degrees(FIELDS).min() < field < np.degrees(FIELDS).max()
+    assert np.degrees(FIELDS_OF_VIEW).min() < field < np.degrees(FIELDS_OF_VIEW).max()
 
 
 @pytest.mark.parametrize(

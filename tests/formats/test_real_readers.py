@@ -1,12 +1,13 @@
 """What the tools themselves read: their own code, where it is installed, sees the image that we see.
 
-Debian's python3-mrcal and python3-camera-calibration-parsers serve the system's Python, pycolmap any; a test
-skips and says so where its tool is absent.
+Debian's python3-mrcal and python3-camera-calibration-parsers serve the system's Python, pycolmap and
+lensfunpy any; a test skips and says so where its tool is absent.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +20,7 @@ from numpy.testing import assert_allclose
 
 from helpers.cameras import SIZE, camera_held, poses, some_pixels
 from orthoscope.formats.export import export
+from orthoscope.formats.load import load_camera
 from orthoscope.formats.record import Contents
 from orthoscope.formats.table import FORMATS
 
@@ -123,6 +125,44 @@ def test_colmap_projects_as_we_do_and_has_our_poses(tmp_path, holding, suffix):
     assert set(found) == set(poses())
     for image, pose in poses().items():
         assert_allclose(found[image], np.hstack([pose.rotation, pose.translation[:, None]]), atol=1e-12)
+
+
+LENSFUN = """
+import json, sys, lensfunpy
+lens = lensfunpy.Database(xml=open(sys.argv[1]).read(), load_common=False, load_bundled=False).lenses[0]
+width, height = int(sys.argv[2]), int(sys.argv[3])
+modifier = lensfunpy.Modifier(lens, lens.crop_factor, width, height)
+modifier.initialize(lens.min_focal, 8.0, flags=lensfunpy.ModifyFlags.DISTORTION)
+print(json.dumps(modifier.apply_geometry_distortion().reshape(height, width, 2)[::40, ::40].tolist()))
+"""
+
+
+@holdings("lensfun")
+@pytest.mark.parametrize("aspect", ["", "3:2", "639:479"])
+def test_lensfun_straightens_as_we_do(tmp_path, holding, aspect):
+    """Its places are rough by .02 px from one pixel to the next (fast square roots in single precision)."""
+    path = tmp_path / "lens.xml"
+    export(camera_held(FORMATS["lensfun"], holding), path, "lensfun")
+    if aspect:
+        text = re.sub(
+            "<aspect-ratio>.*</aspect-ratio>", f"<aspect-ratio>{aspect}</aspect-ratio>", path.read_text()
+        )
+        path.write_text(text)
+    camera = load_camera(path, image_size=SIZE)
+    looked_at = np.array(answer("lensfunpy", LENSFUN, path, *map(str, SIZE)))
+    u, v = np.meshgrid(np.arange(0.0, SIZE[0], 40.0), np.arange(0.0, SIZE[1], 40.0))
+    straight = _focal_of_its_straight_image(path)
+    rays = np.stack(
+        [(u - camera.K[0, 2]) / straight, (v - camera.K[1, 2]) / straight, np.ones_like(u)], axis=-1
+    )
+    assert_allclose(looked_at.reshape(-1, 2), camera.project(rays.reshape(-1, 3)), atol=0.03)
+
+
+def _focal_of_its_straight_image(path: Path) -> float:
+    """The focal length in the file, mm of a frame of 36 mm by 24 mm, in pixels."""
+    found = re.search('focal="([^"]*)"', path.read_text())
+    assert found
+    return float(found[1]) * np.hypot(*SIZE) / np.hypot(36.0, 24.0)
 
 
 @holdings("opencv")

@@ -162,7 +162,7 @@ def test_coefficients_that_only_together_make_the_image_are_named_and_the_camera
 @pytest.mark.parametrize("lens", ["brown", "kannala_brandt", "division"])
 def test_a_start_on_a_sample_of_the_corners_ends_where_one_on_all_of_them_does(lens, monkeypatch):
     sampled = fccm(DENSE, lens=lens)
-    monkeypatch.setattr(sys.modules[fccm.__module__], "SAMPLE", DENSE.corners)
+    monkeypatch.setattr(sys.modules[fccm.__module__], "SAMPLE_CORNERS", DENSE.corners)
     everything = fccm(DENSE, lens=lens)
     # 1e-10 of the cost of 2240 numbers is 5e-4 of a standard deviation, which is below 0.1 px in the image
     # here; and that twice

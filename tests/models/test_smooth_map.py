@@ -12,7 +12,7 @@ from helpers.laws import for_every_lens
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import Brown
-from orthoscope.models.smooth_map import TOLERANCE, smooth_map
+from orthoscope.models.smooth_map import TOLERANCE_PX, smooth_map
 from orthoscope.models.spline import Displacement, Lattice
 
 SIZE = (333, 260)  # no multiple of a tile
@@ -45,7 +45,7 @@ def test_every_lens_is_mapped_as_if_each_pixel_had_been_asked(lens, focal):
     exact = asked_for_each(camera, straight, SIZE)
     maps = np.stack(camera.undistort_map(straight))
     assert_array_equal(np.isnan(maps), np.isnan(exact))
-    assert_allclose(maps, exact, atol=TOLERANCE + AS_FLOAT32)
+    assert_allclose(maps, exact, atol=TOLERANCE_PX + AS_FLOAT32)
 
 
 def test_a_usual_lens_is_mapped_as_well_as_float32_can_say():
@@ -61,7 +61,7 @@ def test_a_lens_about_its_own_centre_is_mapped_as_if_each_pixel_had_been_asked()
     exact = asked_for_each(camera, camera.intrinsics, (400, 300))
     maps = np.stack(camera.undistort_map(size=(400, 300)))
     assert_array_equal(np.isnan(maps), np.isnan(exact))
-    assert_allclose(maps, exact, atol=TOLERANCE + AS_FLOAT32)
+    assert_allclose(maps, exact, atol=TOLERANCE_PX + AS_FLOAT32)
 
 
 def test_a_free_lens_is_mapped_to_a_thousandth_of_a_pixel():
@@ -75,7 +75,7 @@ def test_a_free_lens_is_mapped_to_a_thousandth_of_a_pixel():
     exact = asked_for_each(camera, camera.intrinsics, SIZE)
     maps = np.stack(camera.undistort_map())
     assert_array_equal(np.isnan(maps), np.isnan(exact))
-    assert_allclose(maps, exact, atol=TOLERANCE + AS_FLOAT32)
+    assert_allclose(maps, exact, atol=TOLERANCE_PX + AS_FLOAT32)
 
 
 def test_few_pixels_of_a_smooth_map_are_asked_for():

@@ -18,7 +18,7 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
 from orthoscope.paper.documents import documents
 from orthoscope.paper.entries import MLDC, OURS, PAPER
-from orthoscope.paper.photographs import SPLITS, obliqueness, split
+from orthoscope.paper.photographs import SPLIT_COUNT, obliqueness, split
 from orthoscope.paper.section4 import Plan, run
 from orthoscope.simulation.render import rendered_photographs
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
@@ -81,9 +81,14 @@ def test_every_figure_and_table_has_its_file(made):
         "lenses_low",
         "lenses_high",
     }
-    assert set(made.texts) == {"paper.html", "trials.csv", "methods.csv", "eq7.csv", "table1.csv"} | {
-        f"{name}.csv" for name in figures
-    }
+    assert set(made.texts) == {
+        "paper.html",
+        "trials.csv",
+        "trials_photographs.csv",
+        "methods.csv",
+        "eq7.csv",
+        "table1.csv",
+    } | {f"{name}.csv" for name in figures}
 
 
 def test_files_have_their_columns_and_a_row_for_each_method_and_level(made):
@@ -101,8 +106,8 @@ def test_files_have_their_columns_and_a_row_for_each_method_and_level(made):
         "images",
         "exact",
         "lenses",
-        "photographs",
     }
+    assert {row["study"] for row in rows_of(made.texts["trials_photographs.csv"])} == {"photographs"}
 
 
 def test_figures_are_the_means_of_the_trials(made):
@@ -146,7 +151,7 @@ def test_the_page_needs_nothing_else_and_shows_every_figure(made):
 
 
 def test_every_photograph_is_a_test_once(detections):
-    tested = [view.image for turn in range(SPLITS) for view in split(detections, turn)[1].views]
+    tested = [view.image for turn in range(SPLIT_COUNT) for view in split(detections, turn)[1].views]
     assert sorted(tested) == sorted(view.image for view in detections.views)
     training, test = split(detections, 0)
     assert not {view.image for view in training.views} & {view.image for view in test.views}

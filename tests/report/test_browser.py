@@ -232,6 +232,18 @@ def test_zoom_by_keys_and_back(browser, folder):
     assert browser.run(PIXELS)["displacement"] == whole
 
 
+def test_on_narrower_paper_figures_keep_their_shape(browser, folder):
+    """A printer lays the page out anew and asks nobody to draw again."""
+    browser.open(folder / "ordinary.html")
+    stretched = browser.run(
+        "document.body.style.width = '640px';"
+        " return [...document.querySelectorAll('figure canvas')].filter(c => c.clientWidth)"
+        ".map(c => c.clientWidth / c.clientHeight / (c.width / c.height));"
+    )
+    assert len(stretched) > 5
+    assert stretched == pytest.approx([1.0] * len(stretched), abs=0.02)  # whole pixels
+
+
 def test_tabs_show_the_camera_for_each_tool_and_it_is_copied(browser, folder):
     browser.open(folder / "ordinary.html")
     browser.run(

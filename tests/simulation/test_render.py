@@ -17,10 +17,10 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
 from orthoscope.simulation import render as rendering
 from orthoscope.simulation.render import (
-    BACKGROUND,
-    BLACK,
-    MID_GREY,
-    WHITE,
+    BACKGROUND_LEVEL,
+    BLACK_LEVEL,
+    MID_GREY_LEVEL,
+    WHITE_LEVEL,
     Renderer,
     demo_scene,
     render,
@@ -74,7 +74,11 @@ def by_many_rays(camera: Camera, pose: Pose, pixels: np.ndarray, per_side: int =
     on_sheet = ((squares > -2) & (squares < [COLUMNS + 1, ROWS + 1])).all(1)
     on_pattern = ((squares > -1) & (squares < [COLUMNS, ROWS])).all(1)
     black = on_pattern & (np.floor(squares).sum(1) % 2 == 0)
-    return np.where(black, BLACK, np.where(on_sheet, WHITE, BACKGROUND)).reshape(len(pixels), -1).mean(1)
+    return (
+        np.where(black, BLACK_LEVEL, np.where(on_sheet, WHITE_LEVEL, BACKGROUND_LEVEL))
+        .reshape(len(pixels), -1)
+        .mean(1)
+    )
 
 
 @every_camera
@@ -96,14 +100,17 @@ def test_an_edge_within_a_pixel_gives_the_exact_mixture():
     image = render(PIN_HOLE, BOARD, facing(-0.08205, -0.055875, 0.3), **BARE)
     corner = PIN_HOLE.project(facing(-0.08205, -0.055875, 0.3).apply(BOARD.points[:1]))[0]
     assert_allclose(corner, [45.3, 42.75], atol=1e-9)
-    black_then_white, white_then_black = 0.8 * BLACK + 0.2 * WHITE, 0.8 * WHITE + 0.2 * BLACK
+    black_then_white, white_then_black = (
+        0.8 * BLACK_LEVEL + 0.2 * WHITE_LEVEL,
+        0.8 * WHITE_LEVEL + 0.2 * BLACK_LEVEL,
+    )
     assert_allclose(
         image[30:40, 45], black_then_white, atol=0.5 + 1e-3
     )  # whole grey levels; rays in single precision
     assert_allclose(image[46:56, 45], white_then_black, atol=0.5 + 1e-3)
     # row 43 is crossed from 42.5 to 42.75
-    assert_allclose(image[43, 30:40], 0.25 * BLACK + 0.75 * WHITE, atol=0.5 + 1e-3)
-    assert_allclose(image[43, 50:60], 0.25 * WHITE + 0.75 * BLACK, atol=0.5 + 1e-3)
+    assert_allclose(image[43, 30:40], 0.25 * BLACK_LEVEL + 0.75 * WHITE_LEVEL, atol=0.5 + 1e-3)
+    assert_allclose(image[43, 50:60], 0.25 * WHITE_LEVEL + 0.75 * BLACK_LEVEL, atol=0.5 + 1e-3)
 
 
 def test_the_square_before_the_first_corner_is_black_and_a_white_margin_goes_around():
@@ -114,10 +121,10 @@ def test_the_square_before_the_first_corner_is_black_and_a_white_margin_goes_aro
         column, row = PIN_HOLE.project(pose.apply(np.array([[0.03 * x, 0.03 * y, 0.0]])))[0]
         return image[round(row), round(column)]
 
-    assert grey(-0.5, -0.5) == grey(0.5, 0.5) == grey(5.5, 3.5) == BLACK
-    assert grey(0.5, -0.5) == grey(-0.5, 0.5) == grey(1.5, 0.5) == WHITE
-    assert grey(-1.5, -0.5) == grey(2.5, -1.5) == grey(6.5, 1.5) == grey(2.5, 4.5) == WHITE
-    assert grey(-2.5, 1.5) == grey(2.5, -2.5) == BACKGROUND
+    assert grey(-0.5, -0.5) == grey(0.5, 0.5) == grey(5.5, 3.5) == BLACK_LEVEL
+    assert grey(0.5, -0.5) == grey(-0.5, 0.5) == grey(1.5, 0.5) == WHITE_LEVEL
+    assert grey(-1.5, -0.5) == grey(2.5, -1.5) == grey(6.5, 1.5) == grey(2.5, 4.5) == WHITE_LEVEL
+    assert grey(-2.5, 1.5) == grey(2.5, -2.5) == BACKGROUND_LEVEL
 
 
 @every_camera
@@ -152,7 +159,7 @@ def test_a_board_behind_the_camera_or_edge_on_is_not_seen():
     edge_on = Pose(rotation_from_vector(np.array([np.pi / 2, 0.0, 0.0])), np.array([-0.08, 0.0, 0.3]))
     for pose in (behind, edge_on):
         image = render(PIN_HOLE, BOARD, pose, **BARE)
-        assert (image == BACKGROUND).mean() > 0.99  # edge on, rounding may leave a line
+        assert (image == BACKGROUND_LEVEL).mean() > 0.99  # edge on, rounding may leave a line
 
 
 def test_the_same_generator_gives_the_same_bytes_and_none_gives_no_noise():
@@ -168,7 +175,7 @@ def test_the_rows_drawn_at_once_do_not_show(monkeypatch):
     camera = CAMERAS["normal"]
     pose = random_views(camera, BOARD, 1, rng=rng())[0]
     image = render(camera, BOARD, pose, rng=rng())
-    monkeypatch.setattr(rendering, "ROWS", 7)
+    monkeypatch.setattr(rendering, "ROWS_AT_ONCE", 7)
     assert (
         np.abs(render(camera, BOARD, pose, rng=rng()).astype(int) - image).max() <= 1
     )  # sums in another order, then rounding
@@ -186,17 +193,17 @@ def test_noise_is_as_large_as_asked_at_mid_grey_and_grows_with_light():
         .photograph(BOARD, pose, rng=rng())
         .astype(float)
     )
-    scaled = (loud - calm) / np.sqrt(0.5 + 0.5 * calm / MID_GREY)
+    scaled = (loud - calm) / np.sqrt(0.5 + 0.5 * calm / MID_GREY_LEVEL)
     # 32000 pixels: five standard errors, and what whole grey levels add to both pictures
     assert abs(scaled.mean()) < 5 * 4.0 / np.sqrt(scaled.size) + 0.01
-    rounding = np.sqrt(2 / 12) / np.sqrt(0.5 + 0.5 * calm.mean() / MID_GREY)
+    rounding = np.sqrt(2 / 12) / np.sqrt(0.5 + 0.5 * calm.mean() / MID_GREY_LEVEL)
     assert_allclose(scaled.std(), np.hypot(4.0, rounding), rtol=5 / np.sqrt(2 * scaled.size) + 0.01)
 
 
 def test_the_farthest_corner_loses_the_light_that_vignetting_says():
     image = render(PIN_HOLE, BOARD, facing(0.0, 0.0, -1.0), **{**BARE, "vignetting": 0.4})
-    assert image[80, 100] == BACKGROUND
-    assert abs(image[0, 0] - 0.6 * BACKGROUND) <= 0.5  # whole grey levels
+    assert image[80, 100] == BACKGROUND_LEVEL
+    assert abs(image[0, 0] - 0.6 * BACKGROUND_LEVEL) <= 0.5  # whole grey levels
     assert image[0, 0] == image.min()
 
 

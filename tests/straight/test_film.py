@@ -8,10 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
+from orthoscope.files.films import frames_of as frames_worth_a_look
+from orthoscope.files.sensor_frames import mark_turned, quarter_turns
 from orthoscope.geometry.arrays import InputError
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown
 from orthoscope.straight.film import CODECS, is_video, undistort_video
+from orthoscope.straight.film_av import has_pyav
 from orthoscope.straight.undistort import Straightener
 
 SIZE, FRAMES, RATE = (160, 120), 40, 12.5
@@ -163,3 +166,22 @@ def test_a_film_is_not_written_onto_itself(film_with_sound, tmp_path):
         with pytest.raises(InputError, match="what is read is never written onto"):
             undistort_video(film_with_sound, CAMERA, place)
     assert film_with_sound.read_bytes() == before
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+@pytest.mark.parametrize("pyav", [True, False])
+def test_a_film_that_players_turn_is_straightened_as_the_sensor_saw_it(tmp_path, monkeypatch, quarters, pyav):
+    """A telephone held upright: players turn the film, OpenCV too unless it is told not to."""
+    monkeypatch.setattr("orthoscope.straight.film.has_pyav", lambda: pyav and has_pyav())
+    path, place = tmp_path / "turned.mp4", tmp_path / "straight" / "turned.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), RATE, SIZE)
+    for picture in FILMED[:8]:
+        writer.write(picture)
+    writer.release()
+    mark_turned(path, quarters, size=SIZE)
+    shown = SIZE if quarters == 2 else SIZE[::-1]
+    assert frames_of(path)[0].shape[1::-1] == shown
+    assert frames_worth_a_look(path)[0].picture.shape[::-1] == SIZE
+    assert undistort_video(path, CAMERA, place) == 8
+    assert quarter_turns(path) == quarter_turns(place) == quarters
+    assert frames_of(place)[0].shape[1::-1] == shown

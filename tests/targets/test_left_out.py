@@ -7,7 +7,7 @@ import pytest
 
 from orthoscope.geometry.arrays import InputError
 from orthoscope.targets.detections import Detections, View
-from orthoscope.targets.left_out import LEFT_OUT, left_out
+from orthoscope.targets.left_out import LEFT_OUT_REASON, left_out
 from orthoscope.targets.target import chessboard
 
 CORNERS = np.arange(4), np.arange(8.0).reshape(4, 2)
@@ -21,7 +21,7 @@ FOUND = Detections(
 def test_what_is_left_out_is_set_aside_and_the_others_keep_their_order():
     kept = left_out(FOUND, ["a/1.png"])
     assert [view.image for view in kept.views] == ["b/1.png", "2.png"]
-    assert kept.set_aside == (("a/1.png", LEFT_OUT),)
+    assert kept.set_aside == (("a/1.png", LEFT_OUT_REASON),)
 
 
 def test_a_files_name_is_enough_where_it_is_the_only_such_one():

@@ -14,7 +14,7 @@ from helpers.target_laws import BOARDS, every_board
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
 from orthoscope.geometry.arrays import InputError
-from orthoscope.targets.printing import MARGIN, PAPERS, PRINT_FORMATS, STRIP, page_of, pdf, png, svg
+from orthoscope.targets.printing import MARGIN_MM, PAPERS, PRINT_FORMATS, STRIP_MM, page_of, pdf, png, svg
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import target_of
 
@@ -59,8 +59,8 @@ def test_every_board_is_written_in_every_format_within_the_printers_margins(boar
     page = page_of(target_of(board))
     assert len(PRINT_FORMATS[suffix](page)) > 500
     black = page.rectangles.reshape(-1, 2)
-    assert (black > MARGIN - 1e-9).all()
-    assert (black < np.array([page.width, page.height]) - MARGIN + 0.5).all()
+    assert (black > MARGIN_MM - 1e-9).all()
+    assert (black < np.array([page.width, page.height]) - MARGIN_MM + 0.5).all()
 
 
 def test_the_smallest_paper_that_fits_is_taken_and_one_that_is_too_small_is_refused():
@@ -69,7 +69,8 @@ def test_the_smallest_paper_that_fits_is_taken_and_one_that_is_too_small_is_refu
     with pytest.raises(InputError, match="does not fit on A4"):
         page_of(parse_target("chessboard:9x6:40mm"), paper="A4")
     assert (
-        page_of(parse_target("chessboard:9x6:40mm"), paper=f"{410}x{280 + 2 * MARGIN + STRIP}mm").width == 410
+        page_of(parse_target("chessboard:9x6:40mm"), paper=f"{410}x{280 + 2 * MARGIN_MM + STRIP_MM}mm").width
+        == 410
     )
     with pytest.raises(InputError, match="paper 'napkin'"):
         page_of(parse_target("chessboard:9x6:25mm"), paper="napkin")

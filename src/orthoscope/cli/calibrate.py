@@ -74,6 +74,14 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 )
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
 @options.keep
+@click.option(
+    "--corrected",
+    is_flag=True,
+    help=(
+        "Also write the corrected points, where the pin-hole alone sees the corners: beside the detected ones in"
+        " OUT/corrected.csv, as detections in OUT/corrected.json."
+    ),
+)
 @click.option("--report/--no-report", default=True, help="Whether to write OUT/report.html.")
 @options.verbose
 @options.as_json
@@ -103,6 +111,7 @@ def calibrate_into(
     export: str | None = None,
     undistort: bool = False,
     keep: str = "all",
+    corrected: bool = False,
     report: bool = True,
     verbose: bool = False,
     as_json: bool = False,
@@ -110,7 +119,7 @@ def calibrate_into(
     """The main job; prints the summary and returns the evaluation."""
     from orthoscope.cli.executors import processes, threads
     from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.judged import EVALUATION
+    from orthoscope.cli.judged import EVALUATION_NAME
     from orthoscope.cli.method_settings import settings_from
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import evaluation_lines
@@ -138,6 +147,8 @@ def calibrate_into(
         detections, files = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress
         )
+    for remark in detections.remarks:
+        tell(f"remark     {remark.image}: {remark.words}", err=True)
     save(detections, out / "detections.json")
     written = [out / "detections.json"]
     detections = left_out(detections, without) if without else detections
@@ -146,9 +157,11 @@ def calibrate_into(
         calibration = run(detections, method=method, **given, **told)
     with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
         evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
-    for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION)):
+    for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION_NAME)):
         save(thing, out / name)
         written.append(out / name)
+    if corrected:
+        written += _write_corrected(calibration, out)
     if export:
         written += _write_for(export, calibration, out)
     if report:
@@ -160,6 +173,17 @@ def calibrate_into(
     else:
         tell(*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written)))
     return evaluation
+
+
+def _write_corrected(calibration: Any, out: Path) -> list[Path]:
+    """Write the corrected points, as a table and as detections."""
+    from orthoscope.files.whole_files import write_text
+    from orthoscope.formats.corrected import corrected_csv
+    from orthoscope.formats.own.json import save
+
+    write_text(out / "corrected.csv", corrected_csv(calibration))
+    save(calibration.corrected(), out / "corrected.json")
+    return [out / "corrected.csv", out / "corrected.json"]
 
 
 def _lenses_of(tool: str | None) -> tuple[str, ...]:
@@ -208,11 +232,11 @@ def _write_straight(
             " with the photographs."
         )
     calibration = evaluation.calibration
-    paths = [files[view.image] for view in calibration.detections.views]
+    paths = list(dict.fromkeys(files[view.image] for view in calibration.detections.views))
     view = straight_camera(calibration.camera, keep=keep)
     written, _ = straighten(
         paths, calibration.camera, out / "undistorted", view=view, jobs=jobs, cluster=cluster
     )
-    beside = write_beside(calibration.camera, view, out / "undistorted", maps=False)
+    beside = write_beside(calibration.camera, view, out / "undistorted", maps=None)
     replace_outputs(out / "undistorted", [*written, *beside], paths)
     return out / "undistorted"

@@ -32,7 +32,7 @@ Example:
 \b
 comparison.svg, for print, is written where matplotlib is installed (pip install 'orthoscope[figures]').
 WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or
-decoupled:brown:shape=flat. PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+decoupled:brown:shape=flat; or a camera's file, whose camera stays as it is. PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
 Exit: 0 done, 1 the photographs are too few to hold any out, 2 the command is wrong.
 """
 HEADINGS = ("", "held out (px)", "loses (px)", "NCE", "used (px)", "parameters", "seconds", "lens", "target")
@@ -80,13 +80,19 @@ def compare(
     from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.progress import bar
     from orthoscope.evaluation.comparison.compare import compare as judge
-    from orthoscope.evaluation.comparison.entry import USUAL, parse_entry
+    from orthoscope.evaluation.comparison.entry import USUAL, camera_entry, parse_entry
     from orthoscope.files.whole_files import check_folder, write_text
+    from orthoscope.formats.load import SEPARATOR, load_camera
     from orthoscope.formats.own.json import text_of
     from orthoscope.report.comparison import comparison_page, comparison_svg
 
     check_folder(out)
-    entries = [parse_entry(name) for name in names or USUAL]
+    entries = [
+        camera_entry(name, load_camera(name, image_size=image_size))
+        if Path(name.split(SEPARATOR)[0]).is_file()
+        else parse_entry(name)
+        for name in names or USUAL
+    ]
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         detections, _ = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress

@@ -78,4 +78,6 @@ def detect(
     )
     for entry in aside:
         tell(f"           {entry.image}: {entry.reason}")
+    for remark in detections.remarks:
+        tell(f"remark     {remark.image}: {remark.words}")
     tell(f"wrote      {out}")

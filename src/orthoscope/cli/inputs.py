@@ -13,7 +13,7 @@ from orthoscope.cli.telling import tell
 from orthoscope.formats.corners_vnl import read_vnl
 from orthoscope.formats.own.json import load_detections
 from orthoscope.geometry.arrays import InputError
-from orthoscope.targets.detections import Detections
+from orthoscope.targets.detections import Detections, photograph_of
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
@@ -32,9 +32,13 @@ def detections_from(
 ) -> tuple[Detections, dict[str, Path]]:
     """Detections, and where the photograph of each name is (empty where corners were found before).
 
-    paths: photographs (files, folders, globs), or one .json of ours, or one .vnl. target: needed but for our
-    own file. image_size: needed with a .vnl, which does not know it. jobs, executor, progress: as in
-    `detect`. Raises InputError where something needed is missing.
+    Args:
+        paths: photographs (files, folders, globs), or one .json of ours, or one .vnl.
+        target: needed but for our own file.
+        image_size: needed with a .vnl, which does not know it.
+        jobs, executor, progress: as in `detect`.
+    Raises:
+        InputError: something needed is missing.
     """
     if len(paths) == 1 and Path(paths[0]).suffix == ".json":
         return load_detections(paths[0]), {}
@@ -60,4 +64,9 @@ def detections_from(
     found = detect(files, target, jobs=jobs, executor=executor, progress=progress, most_megapixels=most)
     if others := passed_over(paths, also=FILMS):
         tell(f"passed over {', '.join(f'{count} {end}' for end, count in others.items())}", err=True)
-    return found, dict(zip(names_of(files), files, strict=True))
+    named = dict(zip(names_of(files), files, strict=True))
+    return found, named | {
+        view.image: named[photograph]
+        for view in found.views
+        if (photograph := photograph_of(view.image)) in named
+    }

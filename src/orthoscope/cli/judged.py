@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from orthoscope.evaluation.evaluate import Evaluation
     from orthoscope.fitting.calibration import Calibration
 
-__all__ = ["EVALUATION", "judged_calibration"]
+__all__ = ["EVALUATION_NAME", "judged_calibration"]
 
-EVALUATION = "evaluation.json"  # beside calibration.json
+# An evaluation is written under this name, beside `calibration.json`.
+EVALUATION_NAME = "evaluation.json"
 
 
 def judged_calibration(path: Path, *, folds: int | None, jobs: int | None, cluster: str | None) -> Evaluation:
@@ -28,12 +29,12 @@ def judged_calibration(path: Path, *, folds: int | None, jobs: int | None, clust
     Raises:
         InputError: there is no calibration.
     """
-    from orthoscope.formats.own.json import CALIBRATION, load_calibration
+    from orthoscope.formats.own.json import CALIBRATION_NAME, load_calibration
 
-    if path.is_dir() or path.name == EVALUATION:
-        path = (path if path.is_dir() else path.parent) / CALIBRATION
+    if path.is_dir() or path.name == EVALUATION_NAME:
+        path = (path if path.is_dir() else path.parent) / CALIBRATION_NAME
     calibration = load_calibration(path)
-    found = None if folds else _written(calibration, path.with_name(EVALUATION))
+    found = None if folds else _written(calibration, path.with_name(EVALUATION_NAME))
     return found or _made(calibration, folds=folds, jobs=jobs, cluster=cluster)
 
 

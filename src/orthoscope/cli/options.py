@@ -142,8 +142,10 @@ photos: Decorator = click.argument("photos", nargs=-1, required=True, metavar="P
 target: Decorator = click.option(
     "--target",
     metavar="SPEC",
+    multiple=True,
+    callback=lambda _, __, given: " + ".join(given) or None,
     help=(
-        "What was photographed: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g."
+        "What was photographed, once for each board that the photographs show: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g."
         " chessboard:9x6:25mm; charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:legacy], counting squares;"
         " aprilgrid:COLUMNSxROWS:TAG:SPACING, counting tags; or a target.yaml of Kalibr."
     ),
@@ -171,7 +173,7 @@ method: Decorator = click.option(
     metavar="NAME",
     help=(
         "How to calibrate: decoupled (target's shape and a free lens first), fccm (jointly, the target flat),"
-        " nmldc (straight lines first) or mldc (the paper's)."
+        " nmldc (straight lines first), mldc (the paper's), hartley_kang or fitzgibbon (linearly, lens first)."
     ),
 )
 shape: Decorator = click.option(

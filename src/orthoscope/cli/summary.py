@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["camera_numbers", "evaluation_lines", "to_json"]
 
-SHOWN = 6  # photographs set aside that are listed one by one
+# So many photographs that were set aside are listed one by one.
+LISTED_PHOTOGRAPHS = 6
 
 
 def evaluation_lines(evaluation: Evaluation, *, verbose: bool = False) -> list[str]:
@@ -63,9 +64,11 @@ def _details(evaluation: Evaluation) -> list[str]:
     calibration = evaluation.calibration
     detections, camera, aside = calibration.detections, calibration.camera, calibration.detections.set_aside
     deviations = calibration.uncertainty.deviations
-    lines = [f"set aside  {entry.image}: {entry.reason}" for entry in aside[:SHOWN]]
+    lines = [f"set aside  {entry.image}: {entry.reason}" for entry in aside[:LISTED_PHOTOGRAPHS]]
     lines += (
-        [f"           and {len(aside) - SHOWN} more, all in detections.json"] if len(aside) > SHOWN else []
+        [f"           and {len(aside) - LISTED_PHOTOGRAPHS} more, all in detections.json"]
+        if len(aside) > LISTED_PHOTOGRAPHS
+        else []
     )
     lines += _outlier_lines(detections.outliers)
     lines += [f"suspect    {image}: {reason}" for image, reason in evaluation.suspects]
@@ -112,7 +115,7 @@ def _error_lines(evaluation: Evaluation) -> list[str]:
         return []
     return [
         f"off by     {error.seen_px:.3f} px where corners were seen, {error.frame_px:.3f} over the frame;"
-        f" at the target's distance {error.near_seen_px:.3f}, {error.near_frame_px:.3f}",
+        f" at the target's distances {error.near_seen_px:.3f}, {error.near_frame_px:.3f}",
         f"           of it {error.model_px:.3f} by independent errors of corners, {error.alike_px:.3f} with"
         f" errors alike in a view, {error.views_px:.3f} by leaving views out, {error.bias_px:.3f} against the"
         " richest model",
@@ -164,8 +167,8 @@ def _outlier_lines(outliers: tuple[Outlier, ...]) -> list[str]:
     if not outliers:
         return []
     counts = Counter(outlier.image for outlier in outliers)
-    shown = ", ".join(f"{image} ({count})" for image, count in list(counts.items())[:SHOWN])
-    more = f" and {len(counts) - SHOWN} more" if len(counts) > SHOWN else ""
+    shown = ", ".join(f"{image} ({count})" for image, count in list(counts.items())[:LISTED_PHOTOGRAPHS])
+    more = f" and {len(counts) - LISTED_PHOTOGRAPHS} more" if len(counts) > LISTED_PHOTOGRAPHS else ""
     return [f"outliers   {len(outliers)} corner{'s' if len(outliers) > 1 else ''} left out: {shown}{more}"]
 
 

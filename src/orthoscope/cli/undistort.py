@@ -55,7 +55,11 @@ profile and file type; films their sound and time stamps where PyAV is installed
     help="rectilinear, or for wide lenses equidistant, stereographic, cylindrical or equirectangular.",
 )
 @click.option(
-    "--maps", is_flag=True, help="Also write where each straight pixel looks: OUT/map_x.npy and map_y.npy."
+    "--maps",
+    is_flag=False,
+    flag_value="npy",
+    type=click.Choice(["npy", "opencv"]),
+    help="Also write where each straight pixel looks, for cv2.remap: map_x.npy and map_y.npy, or maps.yml.gz.",
 )
 @options.jobs
 @options.cluster
@@ -69,7 +73,7 @@ def undistort(
     fov: float | None,
     scale: float | None,
     projection: str,
-    maps: bool,
+    maps: str | None,
     jobs: int | None,
     cluster: str | None,
     as_json: bool,
@@ -113,26 +117,21 @@ def undistort(
     tell(f"wrote      {'; '.join(made)}" + (f", and {beside[0]}, their camera" if beside else ""))
 
 
-def write_beside(camera: Any, view: Any, out: Path, *, maps: bool) -> list[Path]:
+def write_beside(camera: Any, view: Any, out: Path, *, maps: str | None) -> list[Path]:
     """Write the straight pictures' camera, where it is one that files can hold, and the maps that were asked for."""
-    import io
-
-    import numpy as np
-
     from orthoscope.files.whole_files import write_bytes
     from orthoscope.formats.own.json import save
     from orthoscope.models.camera import Camera
+    from orthoscope.straight.map_files import map_files
     from orthoscope.straight.views import map_of
 
     written = []
     if isinstance(view, Camera):
         save(view, out / "camera.json")
         written.append(out / "camera.json")
-    if maps:
-        for name, values in zip(("map_x.npy", "map_y.npy"), map_of(camera, view), strict=True):
-            np.save(content := io.BytesIO(), values)
-            write_bytes(out / name, content.getvalue())
-            written.append(out / name)
+    for name, content in map_files(*map_of(camera, view), kind=maps).items() if maps else ():
+        write_bytes(out / name, content)
+        written.append(out / name)
     return written
 
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.grid import grid_shape
-from orthoscope.detection.markers import Markers, find_markers, homography_of, of_one_board
+from orthoscope.detection.markers import Markers, find_markers, homography_of, of_one_board, remark_on
 from orthoscope.detection.partial_board import filled
 from orthoscope.detection.refine import refined
 from orthoscope.detection.sight import Sight, Unseen
@@ -22,11 +22,16 @@ from orthoscope.targets.charuco import Charuco
 
 __all__ = ["see_charuco"]
 
-ENOUGH = 0.9  # of the markers: then no other copy is looked at
-MOST_STRAY = 0.1  # of a square, from its neighbours' lines
-AROUND = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # a square's corners about its middle
-RIM = 2.0  # px: nearer to the picture's rim no corner is sought
-FEWEST = 4  # corners
+# Where this share of the board's markers is found no other copy is looked at.
+ENOUGH_MARKERS_SHARE = 0.9
+# A corner strays from its neighbours' lines by less than this share of a square.
+MOST_STRAY_SHARE = 0.1
+# These are a square's corners about its middle.
+SQUARE_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+# No corner is sought nearer to the picture's rim than this, pixels.
+RIM_PX = 2.0
+# A sight of the board has at least this many corners.
+FEWEST_CORNERS = 4
 
 
 def see_charuco(grey: ndarray, board: Charuco) -> Sight | Unseen:
@@ -37,33 +42,35 @@ def see_charuco(grey: ndarray, board: Charuco) -> Sight | Unseen:
         board: what to look for.
     """
     count = len(board.marker_squares())
-    found = find_markers(grey, board.dictionary, int(ENOUGH * count))
-    markers, legacy = _in_layout(found, board)
+    found = find_markers(grey, board.dictionary, int(ENOUGH_MARKERS_SHARE * count))
+    markers, legacy, remark = _in_layout(found, board)
     if not len(markers.numbers):
         return Unseen(f"was not found in it: none of the markers of {board.dictionary} was")
     columns, rows = board.grid
     grid = _foreseen(markers, board.marker_corners(legacy=legacy), columns, rows)
     corners, good = _grown(grey, grid, board.arm)
-    if good.sum() < FEWEST:
+    if good.sum() < FEWEST_CORNERS:
         return Unseen(
             f"was not found in it: {len(markers.numbers)} of its markers were, but no corners between them"
         )
     ids = np.flatnonzero(good)
-    return Sight(ids, corners.reshape(-1, 2)[ids])
+    return Sight(ids, corners.reshape(-1, 2)[ids], remark)
 
 
-def _in_layout(found: Markers, board: Charuco) -> tuple[Markers, bool]:
-    """The markers that are the board's, and whether they lie in the old layout; of two equally good, as it is
-    said.
+def _in_layout(found: Markers, board: Charuco) -> tuple[Markers, bool, str]:
+    """The markers that are the board's, whether they lie in the old layout (of two equally good, as it is
+    said), and a remark on the choice.
     """
-    best = Markers(found.numbers[:0], found.corners[:0]), board.legacy
+    best = Markers(found.numbers[:0], found.corners[:0]), board.legacy, ""
+    numbers = found.numbers - board.first
     for legacy in (board.legacy, not board.legacy):
         plane = board.marker_corners(legacy=legacy)
-        known = found.numbers < len(plane)
-        markers = Markers(found.numbers[known], found.corners[known])
+        known = (numbers >= 0) & (numbers < len(plane))
+        markers = Markers(numbers[known], found.corners[known])
         mine = of_one_board(markers, plane[markers.numbers])
         if mine.sum() > len(best[0].numbers):
-            best = Markers(markers.numbers[mine], markers.corners[mine]), legacy
+            chosen = Markers(markers.numbers[mine], markers.corners[mine])
+            best = chosen, legacy, remark_on(markers, mine)
     return best
 
 
@@ -75,7 +82,7 @@ def _foreseen(
     """
     total, count = np.zeros((rows, columns, 2)), np.zeros((rows, columns, 1))
     for number, corners in zip(markers.numbers, markers.corners, strict=True):
-        places = np.round(plane[number].mean(0) + AROUND)
+        places = np.round(plane[number].mean(0) + SQUARE_CORNERS)
         on_board = ((places >= 0) & (places < [columns, rows])).all(1)
         if on_board.any():
             there = places[on_board]
@@ -94,7 +101,7 @@ def _grown(
     tried = good.copy()
     start = grid
     for _ in range(sum(grid.shape[:2])):
-        inside = ((start >= RIM) & (start <= np.array(grey.shape[::-1]) - 1 - RIM)).all(-1)
+        inside = ((start >= RIM_PX) & (start <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(-1)
         new = inside & ~tried
         if not new.any():
             break
@@ -102,11 +109,11 @@ def _grown(
         row, column = np.nonzero(good | new)
         places = np.stack([column, row], axis=1).astype(float)
         fine = refined(grey, start[row, column], places, approach=False, arm=arm)
-        fits = fine.believed & (grid_shape(fine.pixels, places).stray < MOST_STRAY)
+        fits = fine.believed & (grid_shape(fine.pixels, places).stray < MOST_STRAY_SHARE)
         grid, good = np.full_like(grid, np.nan), np.zeros_like(good)
         grid[row[fits], column[fits]] = fine.pixels[fits]
         good[row[fits], column[fits]] = True
-        if good.sum() < FEWEST:
+        if good.sum() < FEWEST_CORNERS:
             break
         start = filled(grid, rounds=1)
     return grid, good

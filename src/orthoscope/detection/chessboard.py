@@ -18,6 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from orthoscope.detection.board_marks import ways_by_marks
 from orthoscope.detection.copies import resized, to_photograph
 from orthoscope.detection.grid import cross, grid_shape
 from orthoscope.detection.lattices import CornerLattice, lattices
@@ -25,26 +26,40 @@ from orthoscope.detection.opencv_finders import opencv_boards
 from orthoscope.detection.partial_board import Grid, filled, grid_of, laid_out, placements
 from orthoscope.detection.refine import Refined, refined
 from orthoscope.detection.saddle_points import saddle_points
-from orthoscope.detection.sight import Sight, Unseen
+from orthoscope.detection.sight import TWICE, Sight, Unseen
 from orthoscope.geometry.arrays import Bool, Float, InputError, Int, ndarray
 from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.marked_chessboard import MarkedChessboard
 
 __all__ = ["board_size", "find_chessboard", "see_chessboard"]
 
-SIDES = (640, 320, 1280, 2560)  # of the copies, px: most boards are found in the first
-LOOKED_AT = 2  # lattices of each copy: a chequered shirt may be larger than the board
-FEWEST = 6  # corners of a part of a board
-ENOUGH = 0.25  # of the board's corners hang together, or it is not worth while to try other finders
-TOO_MANY = 1.5  # times the board's corners: a tiled floor, not a board
-FLOOR = 6  # times the board's corners in one lattice: whatever it is, no further copy is looked at
-REPAIRS = 2  # times that a corner off its neighbours' lines is sought again
-OFF, OFF_NO_SADDLE = (0.1, 6.0), (0.04, 3.0)  # a corner is off: steps at least, times the usual stray
-USUAL_STRAY = 0.03  # of a step, at most
-RIM = 2.0  # px: nearer to the picture's rim no corner is sought that was not seen
-MOST_DOUBTFUL = 0.4  # of the corners of a part: with more that are no saddles it is not believed
+# Copies have these longer sides, pixels; most boards are found in the first.
+COPY_SIDES = (640, 320, 1280, 2560)
+# So many lattices of each copy are looked at, since a chequered shirt may be larger than the board.
+LATTICES_PER_COPY = 2
+# A part of a board has at least this many corners.
+FEWEST_CORNERS = 6
+# At least this share of the board's corners hangs together, or trying other finders is not worth while.
+ENOUGH_CORNERS_SHARE = 0.25
+# More than this many times the board's corners are a tiled floor, not a board.
+TOO_MANY_RATIO = 1.5
+# Where one lattice has this many times the board's corners, whatever it is, no further copy is looked at.
+FLOOR_RATIO = 6
+# A corner that is off its neighbours' lines is sought again so many times.
+REPAIR_ROUNDS = 2
+# A corner is off its neighbours' lines by at least so many steps, and so many times the usual stray.
+OFF_LIMITS = (0.1, 6.0)
+# A corner that is no saddle is off by at least so many steps, and so many times the usual stray.
+OFF_LIMITS_WITHOUT_SADDLE = (0.04, 3.0)
+# The usual stray is at most this, steps.
+LARGEST_USUAL_STRAY = 0.03
+# No corner that was not seen is sought nearer to the picture's rim than this, pixels.
+RIM_PX = 2.0
+# A part with more than this share of corners that are no saddles is not believed.
+MOST_DOUBTFUL_SHARE = 0.4
 
 
-def see_chessboard(grey: ndarray, board: Chessboard) -> Sight | Unseen:
+def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | Unseen:
     """The inner corners of a board, or of the part of it that can be seen.
 
     Rows and columns lie as x and y do, seen from the front. Corner 0 is the one with a dark square beyond it,
@@ -63,25 +78,42 @@ def see_chessboard(grey: ndarray, board: Chessboard) -> Sight | Unseen:
             " at least 3x3."
         )
     parts, hanging, open_ = [], 0, False
-    for found, copy in _hanging_together(grey):
+    for found, copy, others in _hanging_together(grey):
         hanging = max(hanging, len(found.pixels))
-        if hanging > FLOOR * board.columns * board.rows:
+        if hanging > FLOOR_RATIO * board.columns * board.rows:
             break
-        grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST else None
+        grid = _in_photograph(grey, copy, found, board)
         if grid is None:
             continue
-        sight = _on_board(grey, grid._replace(corners=to_photograph(grid.corners, copy, grey)), board)
+        sight = _on_board(grey, grid, board)
         open_ |= sight is None
         if sight and len(sight.ids) == board.columns * board.rows:
-            return sight
-        parts += [sight] if sight and len(sight.ids) >= FEWEST else []
+            alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in others)
+            return sight._replace(remark=TWICE) if alike else sight
+        parts += [sight] if sight and len(sight.ids) >= FEWEST_CORNERS else []
     best = max(parts, key=lambda sight: len(sight.ids), default=None)
     count = board.columns * board.rows
-    if ENOUGH * count <= hanging <= TOO_MANY * count and (best is None or len(best.ids) > 0.8 * count):
+    if ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count and (
+        best is None or len(best.ids) > 0.8 * count
+    ):
         best = _by_opencv(grey, board) or best
     if best:
         return best
-    return Unseen("only a part of it was seen, which may be several" if open_ else "was not found in it")
+    return Unseen("is in it in part only, and which part cannot be told" if open_ else "was not found in it")
+
+
+def _in_photograph(
+    grey: ndarray, copy: ndarray, found: CornerLattice, board: Chessboard | MarkedChessboard
+) -> Grid | None:
+    """The grid of a copy's lattice, in the photograph's pixels; None where nothing is left of it."""
+    grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_CORNERS else None
+    return grid and grid._replace(corners=to_photograph(grid.corners, copy, grey))
+
+
+def _is_whole(grid: Grid | None, board: Chessboard | MarkedChessboard) -> bool:
+    """Whether a grid is a whole board of these counts."""
+    whole = grid is not None and grid.seen.size == board.columns * board.rows
+    return whole and bool(placements(grid, board.columns, board.rows))
 
 
 def find_chessboard(grey: ndarray, columns: int, rows: int) -> Float[ndarray, "m 2"] | None:
@@ -94,7 +126,7 @@ def find_chessboard(grey: ndarray, columns: int, rows: int) -> Float[ndarray, "m
 
 def board_size(grey: ndarray) -> tuple[int, int] | None:
     """The columns and rows of the board that is in a photograph, all four of its sides seen; else None."""
-    for found, copy in _hanging_together(grey):
+    for found, copy, _ in _hanging_together(grey):
         grid = laid_out(copy, found, max(found.size))
         if grid and all(grid.ends) and min(grid.seen.shape) > 2:
             rows, columns = sorted(grid.seen.shape)
@@ -102,25 +134,32 @@ def board_size(grey: ndarray) -> tuple[int, int] | None:
     return None
 
 
-def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray]]:
-    """The largest lattices of each copy, and the copy."""
+def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, list[CornerLattice]]]:
+    """The largest lattices of each copy, the copy, and the lattices of it that are smaller."""
     shapes = set()
-    for side in SIDES:
+    for side in COPY_SIDES:
         copy = resized(grey, side)
         if copy.shape not in shapes:
             shapes.add(copy.shape)
-            for found in lattices(saddle_points(copy))[:LOOKED_AT]:
-                yield found, copy
+            found = lattices(saddle_points(copy))[:LATTICES_PER_COPY]
+            for number, one in enumerate(found, 1):
+                yield one, copy, found[number:]
 
 
-def _on_board(grey: ndarray, grid: Grid, board: Chessboard) -> Sight | None:
+def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> Sight | None:
     """The corners with their ids, refined; None where the grid is not the board's or the ids are open."""
     ways = placements(grid, board.columns, board.rows)
+    arms = np.ones(grid.seen.shape)
+    if isinstance(board, MarkedChessboard):
+        negative = placements(grid, board.columns, board.rows, negative=True)
+        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(grey, grid, negative, board)
     if not ways or not _alike(ways, grid.seen, board.symmetries()):
         return None
     whole = grid.seen.size == board.columns * board.rows
     ids = _first_way(ways, grid.corners, whole)
-    pixels, good = _refined(grey, grid.corners, grid.seen)
+    if isinstance(board, MarkedChessboard):
+        arms[np.isin(ids, board.marked_corners())] = board.arm
+    pixels, good = _refined(grey, grid.corners, grid.seen, arms)
     order = np.argsort(ids[good])
     return Sight(ids[good][order], pixels[good][order])
 
@@ -142,28 +181,31 @@ def _first_way(ways: list[ndarray], corners: ndarray, whole: bool) -> Int[ndarra
 
 
 def _refined(
-    grey: ndarray, corners: Float[ndarray, "r c 2"], seen: Bool[ndarray, "r c"]
+    grey: ndarray,
+    corners: Float[ndarray, "r c 2"],
+    seen: Bool[ndarray, "r c"],
+    arms: Float[ndarray, "r c"],
 ) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"]]:
     """The grid's corners in the photograph, and which of them are good."""
-    inside = ((corners >= RIM) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM)).all(-1)
+    inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(-1)
     row, column = np.nonzero(seen | inside)
     places = np.stack([column, row], axis=1).astype(float)
-    fine = refined(grey, corners[row, column], places)
+    fine = refined(grey, corners[row, column], places, arm=arms[row, column])
     off = _off(fine, places)
-    for _ in range(REPAIRS):
+    for _ in range(REPAIR_ROUNDS):
         if not off.any() or off.all():
             break
         known = np.full_like(corners, np.nan)
         known[row[~off], column[~off]] = fine.pixels[~off]
         start = np.where(off[:, None], filled(known)[row, column], fine.pixels)
-        again = refined(grey, start, places, approach=False)
+        again = refined(grey, start, places, approach=False, arm=arms[row, column])
         fine = Refined(
             np.where(off[:, None], again.pixels, fine.pixels), np.where(off, again.believed, fine.believed)
         )
         off = _off(fine, places)
     good = np.zeros_like(seen)
     good[row, column] = ~off & (seen[row, column] | fine.believed)
-    if not good.all() and (~fine.believed[good[row, column]]).mean() > MOST_DOUBTFUL:
+    if not good.all() and (~fine.believed[good[row, column]]).mean() > MOST_DOUBTFUL_SHARE:
         good[:] = False
     pixels = corners.copy()
     pixels[row, column] = fine.pixels
@@ -173,13 +215,15 @@ def _refined(
 def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
     """Which corners are off their neighbours' lines by more than is usual, no saddles sooner."""
     stray = grid_shape(fine.pixels, places).stray
-    usual = min(float(np.median(stray)), USUAL_STRAY)
+    usual = min(float(np.median(stray)), LARGEST_USUAL_STRAY)
     return stray > np.where(
-        fine.believed, max(OFF[0], OFF[1] * usual), max(OFF_NO_SADDLE[0], OFF_NO_SADDLE[1] * usual)
+        fine.believed,
+        max(OFF_LIMITS[0], OFF_LIMITS[1] * usual),
+        max(OFF_LIMITS_WITHOUT_SADDLE[0], OFF_LIMITS_WITHOUT_SADDLE[1] * usual),
     )
 
 
-def _by_opencv(grey: ndarray, board: Chessboard) -> Sight | None:
+def _by_opencv(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | None:
     """What OpenCV's finders see, if it is the whole board."""
     for rough in opencv_boards(grey, board.columns, board.rows):
         corners = rough.reshape(board.rows, board.columns, 2)

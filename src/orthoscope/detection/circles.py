@@ -18,12 +18,18 @@ from orthoscope.targets.circles import Circles
 
 __all__ = ["see_circles"]
 
-SIDES = (640, 1280, 2560)  # px, of the copies
-FEWEST = 6  # discs
-LEAST_SHARE = 0.15  # of the board's discs
-ENOUGH = 0.97  # of the board's discs: then no other copy is looked at
-SMALLEST = 16  # px, side of a picture
-MOST_FROM_FORESEEN = 0.8  # radii
+# Copies have these longer sides, pixels.
+COPY_SIDES = (640, 1280, 2560)
+# A sight of the board has at least this many discs.
+FEWEST_DISCS = 6
+# A sight of the board has at least this share of its discs.
+LEAST_DISCS_SHARE = 0.15
+# Where this share of the board's discs is found no other copy is looked at.
+ENOUGH_DISCS_SHARE = 0.97
+# No picture with a shorter side, pixels, is looked at.
+SMALLEST_SIDE = 16
+# A disc is no farther from where it was foreseen than so many of its radii.
+FARTHEST_RADII = 0.8
 
 
 def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
@@ -36,27 +42,27 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
     count = board.columns * board.rows
     best: tuple[Int[ndarray, " n"], ndarray] = np.zeros(0, dtype=int), np.zeros((0, 2))
     several, seen, shapes = False, 0, set()
-    for side in SIDES:
+    for side in COPY_SIDES:
         copy = resized(grey, side)
-        if copy.shape in shapes or min(copy.shape) < SMALLEST:
+        if copy.shape in shapes or min(copy.shape) < SMALLEST_SIDE:
             continue
         shapes.add(copy.shape)
         for picture, whole in ((copy, grey), (255 - copy, 255 - grey)):
             for found in spots(picture):
                 which, places = numbered(found)
                 seen = max(seen, len(which))
-                if len(which) < max(FEWEST, LEAST_SHARE * count, len(best[0])):
+                if len(which) < max(FEWEST_DISCS, LEAST_DISCS_SHARE * count, len(best[0])):
                     continue
                 discs = Ellipses(found.centres[which], found.axes[which])
                 ids, unsure = laid_on(board, discs, places, copy.shape)
                 several |= unsure
-                if (ids >= 0).sum() >= FEWEST:
+                if (ids >= 0).sum() >= FEWEST_DISCS:
                     best = max(
                         best, _outlined(copy, whole, board, discs, ids), key=lambda sight: len(sight[0])
                     )
-                if len(best[0]) >= ENOUGH * count:
+                if len(best[0]) >= ENOUGH_DISCS_SHARE * count:
                     return Sight(*best)
-    if len(best[0]) >= FEWEST:
+    if len(best[0]) >= FEWEST_DISCS:
         return Sight(*best)
     if several:
         return Unseen("is in it in part only, and which part cannot be told")
@@ -74,12 +80,12 @@ def _outlined(
     for _ in range(board.columns + board.rows):
         good = np.isfinite(fine.centres[:, 0])
         known, fine = known[good], Ellipses(fine.centres[good], fine.axes[good])
-        if len(known) < FEWEST:
+        if len(known) < FEWEST_DISCS:
             break
         more, there = foreseen(board, fine, known, grey.shape)
         added = refined_discs(grey, there)
         off = np.linalg.norm(added.centres - there.centres, axis=1)
-        near = off < MOST_FROM_FORESEEN * np.sqrt(np.abs(np.linalg.det(there.axes)))
+        near = off < FARTHEST_RADII * np.sqrt(np.abs(np.linalg.det(there.axes)))
         if not near.any():
             break
         known = np.concatenate([known, more[near]])

@@ -19,30 +19,33 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.detection.chessboard import board_size
-from orthoscope.detection.sight import Sight
-from orthoscope.detection.table import check_can_be_seen, see
+from orthoscope.detection.sight import Sight, Unseen
+from orthoscope.detection.table import check_can_be_seen
+from orthoscope.detection.together import see_members
 from orthoscope.files.images import MOST_MEGAPIXELS
 from orthoscope.files.pictures import Given, Picture, pictures
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.targets.chessboard import Chessboard
-from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.detections import Detections, Remark, SetAside, View, view_name
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
 __all__ = ["detect"]
 
-LISTED = 5  # photographs whose reasons are told where none showed the target
-LOOKED_AT = 3  # photographs that are then looked at for a board of another size
+# Where none showed the target the reasons of so many photographs are told.
+LISTED_PHOTOGRAPHS = 5
+# Where none showed the target so many photographs are looked at for a board of another size.
+TRIED_PHOTOGRAPHS = 3
 
 
 class _Look(NamedTuple):
-    """What one photograph came to: its size and a digest of its picture, and corners or the reason why there
-    are none.
+    """What one photograph came to: its size and a digest of its picture, and corners, of each target that it
+    shows by the target's number, or the reason why there are none.
     """
 
     size: tuple[int, int] | None
     digest: str
-    found: Sight | None
+    found: dict[int, Sight]
     reason: str
 
 
@@ -59,7 +62,7 @@ def detect(
 
     Args:
         photographs: files, folders, globs and films; or arrays (h,w) or (h,w,3), alone, several or by name.
-        target: or its description, such as `chessboard:9x6:25mm`.
+        target: or its description, such as `chessboard:9x6:25mm`; of several ` + ` between them.
         jobs: photographs looked at at once, as many as there are cores.
         executor: of one's own, instead of jobs.
         progress: called with (done, total, name).
@@ -80,10 +83,16 @@ def detect(
             if progress:
                 progress(len(looks), len(given), names[len(looks) - 1])
     size = _usual_size(looks)
-    views, aside = _sorted_out(names, looks, size)
+    views, aside = _sorted_out(names, looks, size, bool(target.members))
+    remarks = [
+        Remark(name, f"{(target.members or (target,))[number].name} {sight.remark}")
+        for name, look in zip(names, looks, strict=True)
+        for number, sight in look.found.items()
+        if sight.remark
+    ]
     if not views or size is None:
         raise CalibrationError(_nothing_found(given, looks, target, aside))
-    return Detections(target, size, tuple(views), tuple(aside))
+    return Detections(target, size, tuple(views), tuple(aside), remarks=tuple(remarks))
 
 
 def _placed(picture: Picture) -> Picture:
@@ -96,14 +105,19 @@ def _look(picture: Picture, target: Target, most_megapixels: float) -> _Look:
     try:
         grey = picture.grey(most_megapixels=most_megapixels)
     except InputError as error:
-        return _Look(None, "", None, str(error).removeprefix(f"{picture.source} "))
+        return _Look(None, "", {}, str(error).removeprefix(f"{picture.source} "))
     size = (grey.shape[1], grey.shape[0])
-    found = see(grey, target)
+    sights = see_members(grey, target)
+    reasons = [
+        f"{member.name} {sight.reason}"
+        for member, sight in zip(target.members or (target,), sights, strict=True)
+        if isinstance(sight, Unseen)
+    ]
     return _Look(
         size,
         hashlib.sha256(grey.tobytes()).hexdigest(),
-        found if isinstance(found, Sight) else None,
-        "" if isinstance(found, Sight) else f"{target.name} {found.reason}",
+        {number: sight for number, sight in enumerate(sights) if isinstance(sight, Sight)},
+        "; ".join(reasons),
     )
 
 
@@ -121,9 +135,9 @@ def _usual_size(looks: list[_Look]) -> tuple[int, int] | None:
 
 
 def _sorted_out(
-    names: list[str], looks: list[_Look], size: tuple[int, int] | None
+    names: list[str], looks: list[_Look], size: tuple[int, int] | None, several: bool
 ) -> tuple[list[View], list[SetAside]]:
-    """Views, and photographs set aside."""
+    """Views, of several targets one for each that a photograph shows; and photographs set aside."""
     views: list[View] = []
     aside: list[SetAside] = []
     first: dict[str, str] = {}
@@ -134,10 +148,13 @@ def _sorted_out(
             )
         elif look.digest and look.digest in first:
             aside.append(SetAside(name, f"the same picture as {first[look.digest]}"))
-        elif look.found is None:
+        elif not look.found:
             aside.append(SetAside(name, look.reason))
         else:
-            views.append(View(name, *look.found))
+            views += [
+                View(view_name(name, number) if several else name, sight.ids, sight.pixels)
+                for number, sight in look.found.items()
+            ]
         if look.digest:
             first.setdefault(look.digest, name)
     return views, aside
@@ -146,8 +163,8 @@ def _sorted_out(
 def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, aside: list[SetAside]) -> str:
     """Why no photograph could be used, and which board seems to be there instead."""
     readable = [picture for picture, look in zip(given, looks, strict=True) if look.size]
-    reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:LISTED])
-    if more := len(aside) - LISTED:
+    reasons = "".join(f"\n  {entry.image}: {entry.reason}" for entry in aside[:LISTED_PHOTOGRAPHS])
+    if more := len(aside) - LISTED_PHOTOGRAPHS:
         reasons += f"\n  and {more} more" if more > 0 else ""
     if not readable:
         return f"none of {len(given)} photographs can be read; expected images. Look at them:{reasons}"
@@ -165,7 +182,7 @@ def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, asi
 
 def _board_instead(given: list[Picture], target: Chessboard) -> tuple[int, int] | None:
     """The size of the board that most of a few photographs show, where it is not the target's."""
-    few = given[:: max(1, len(given) // LOOKED_AT)][:LOOKED_AT]
+    few = given[:: max(1, len(given) // TRIED_PHOTOGRAPHS)][:TRIED_PHOTOGRAPHS]
     seen = Counter(board for picture in few if (board := board_size(picture.grey(most_megapixels=np.inf))))
     others = {board: count for board, count in seen.items() if sorted(board) != sorted(target.grid)}
     return max(others, key=lambda board: others[board], default=None)

@@ -21,16 +21,26 @@ from orthoscope.targets.circles import Circles
 
 __all__ = ["foreseen", "laid_on", "numbered"]
 
-AROUND = 12  # discs that may be next to one
-LIKE_SIZE = 2.2  # areas of neighbours differ by no more
-LENGTHS = (0.7, 1.42)  # of the nearest neighbour's distance
-ANGLE = 0.35  # radians from a right angle
-STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # in the order of the four directions
-MOST_MISSING = 0.12  # of the discs found
-RIVAL = 0.5  # of a shorter side's discs: with no more missing than so many, another way is as good
-MOST_OFF_BOARD = 1  # spots that joined the lattice by chance
-NEARBY = 12  # discs that foresee one
-MARGIN = 1.25  # of a disc must be in the picture for it to be seen
+# So many discs may be next to one.
+NEIGHBOUR_CANDIDATES = 12
+# Neighbours' areas differ by no more than this factor.
+MOST_AREA_RATIO = 2.2
+# A neighbour is within this range of the nearest one's distance.
+LENGTH_RANGE = (0.7, 1.42)
+# A neighbour's direction is off its right angle by less than this, radians.
+MOST_ANGLE = 0.35
+# These are the steps on the lattice, in the order of the four directions.
+DIRECTION_STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+# At most this share of the discs found has no place on the board.
+MOST_MISSING_SHARE = 0.12
+# Another way to lay the board is as good when it misses no more than this share of a shorter side's discs.
+RIVAL_SHARE = 0.5
+# At most so many spots join the lattice by chance.
+MOST_SPOTS_OFF_BOARD = 1
+# So many discs nearby foresee one.
+FORESEEING_DISCS = 12
+# A disc is seen when it is in the picture with its radii multiplied by this.
+SEEN_MARGIN = 1.25
 
 
 def numbered(discs: Ellipses) -> tuple[Int[ndarray, " n"], Int[ndarray, "n 2"]]:
@@ -48,7 +58,10 @@ def numbered(discs: Ellipses) -> tuple[Int[ndarray, " n"], Int[ndarray, "n 2"]]:
                 if other < 0 or other in placed:
                     continue
                 back = int(np.flatnonzero(neighbour[other] == disc)[0])
-                placed[other] = place + STEPS[(direction + turn) % 4], (direction + turn + 2 - back) % 4
+                placed[other] = (
+                    place + DIRECTION_STEPS[(direction + turn) % 4],
+                    (direction + turn + 2 - back) % 4,
+                )
                 waiting.append(int(other))
         left -= placed.keys()
         if len(placed) > len(best):
@@ -74,8 +87,8 @@ def _neighbours(discs: Ellipses) -> Int[ndarray, "n 4"]:
         far = np.hypot(*offsets.T)
         far[disc] = np.inf
         ratio = areas / areas[disc]
-        far[(ratio > LIKE_SIZE) | (ratio < 1.0 / LIKE_SIZE)] = np.inf
-        near = np.argpartition(far, min(AROUND, count - 1))[:AROUND]
+        far[(ratio > MOST_AREA_RATIO) | (ratio < 1.0 / MOST_AREA_RATIO)] = np.inf
+        near = np.argpartition(far, min(NEIGHBOUR_CANDIDATES, count - 1))[:NEIGHBOUR_CANDIDATES]
         near = near[np.isfinite(far[near])]
         if not len(near):
             continue
@@ -84,7 +97,7 @@ def _neighbours(discs: Ellipses) -> Int[ndarray, "n 4"]:
         direction = np.arctan2(*offsets[near].T[::-1]) - np.arctan2(*offsets[nearest][::-1])
         quarter = np.rint(direction / (0.5 * np.pi))
         off = np.abs(direction - quarter * 0.5 * np.pi)
-        good = (off < ANGLE) & (length > LENGTHS[0]) & (length < LENGTHS[1])
+        good = (off < MOST_ANGLE) & (length > LENGTH_RANGE[0]) & (length < LENGTH_RANGE[1])
         for k in np.flatnonzero(good)[np.argsort(-off[good])]:  # the straightest last, so that it stays
             found[disc, int(quarter[k]) % 4] = near[k]
     for disc in range(count):
@@ -120,13 +133,13 @@ def laid_on(
                 inside = ((cells >= 0) & (cells < table.shape)).all(1)
                 ids = np.full(len(cells), -1)
                 ids[inside] = table[tuple(cells[inside].T)]
-                if (ids < 0).sum() <= MOST_OFF_BOARD and (ids >= 0).sum() >= 4:
+                if (ids < 0).sum() <= MOST_SPOTS_OFF_BOARD and (ids >= 0).sum() >= 4:
                     ways.append(ids)
     missing = np.array([_missing(board, discs, ids, shape) for ids in ways])
-    if not len(ways) or missing.min() > MOST_MISSING * len(places):
+    if not len(ways) or missing.min() > MOST_MISSING_SHARE * len(places):
         return np.full(len(places), -1), False
     off = np.array([(ids < 0).sum() for ids in ways])
-    most = missing.min() + RIVAL * min(board.columns, board.rows)
+    most = missing.min() + RIVAL_SHARE * min(board.columns, board.rows)
     good = [ways[i] for i in np.flatnonzero((missing <= most) & (off <= off[missing.argmin()]))]
     return _of_same(board, discs, good)
 
@@ -167,14 +180,14 @@ def foreseen(
     next_to = np.flatnonzero(apart.min(1, initial=9) == 1)
     where, like = [], []
     for k in next_to:
-        nearest = np.argsort(apart[k], kind="stable")[:NEARBY]
+        nearest = np.argsort(apart[k], kind="stable")[:FORESEEING_DISCS]
         x, y = (places[known[nearest]] - places[missing[k]]).T.astype(float)
         terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-        enough = len(nearest) >= NEARBY and min(len(np.unique(x)), len(np.unique(y))) >= 3
+        enough = len(nearest) >= FORESEEING_DISCS and min(len(np.unique(x)), len(np.unique(y))) >= 3
         width = 6 if enough else 3
         where.append(np.linalg.lstsq(terms[:, :width], centres[nearest], rcond=None)[0][0])
         like.append(axes[nearest[0]])
     found = Ellipses(np.array(where).reshape(-1, 2), np.array(like).reshape(-1, 2, 2))
-    reach = MARGIN * np.linalg.norm(found.axes, axis=2)
+    reach = SEEN_MARGIN * np.linalg.norm(found.axes, axis=2)
     inside = ((found.centres - reach > 1) & (found.centres + reach < np.array(shape[1::-1]) - 2)).all(1)
     return missing[next_to][inside], Ellipses(found.centres[inside], found.axes[inside])

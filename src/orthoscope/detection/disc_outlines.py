@@ -22,24 +22,47 @@ from orthoscope.geometry.ellipses import Ellipses, fit_ellipses
 
 __all__ = ["refined_discs", "spots"]
 
-SURROUNDINGS = (0.12, 0.04, 0.3)  # of the longer side: windows of the thresholds
-STEP = 6.0  # grey levels below its surroundings, at least
-FEWEST_PIXELS = 9  # of a spot
-LARGEST_SHARE = 0.2  # of the picture
-LEAST_LIKE = 0.93  # A / (4 pi sqrt(det C)); a square has .955, but small discs are stairs
-SHARP_PIXELS, LEAST_LIKE_SHARP = 120, 0.975  # from so many pixels on stairs no longer matter
-LEAST_WIDTH = 0.9  # px: half the shorter axis
-MOST_OBLONG = 12.0  # one axis over the other
-MOST_SPOTS = 4000  # more are noise
-RAYS = 48
-SAMPLES = 41  # along a ray
-INSIDE, OUTSIDE = 0.45, 1.45  # radii between which the outline is sought; a neighbour begins beyond
-LEVELS = 0.25  # of a radius at either end, over which the levels are taken
-ROUNDS = 3
-LEAST_CONTRAST = 8.0  # grey levels
-MOST_ROUGH = 0.12  # rms of the outline about its ellipse, radii
-LEAST_SEEN = 0.9  # of the rays
-SMOOTHING = 0.7  # px
+# Thresholds are taken over windows of these shares of the longer side.
+WINDOW_SHARES = (0.12, 0.04, 0.3)
+# A spot is darker than its surroundings by at least so many grey levels.
+LEAST_STEP = 6.0
+# A spot has at least this many pixels.
+FEWEST_PIXELS = 9
+# A spot covers less than this share of the picture.
+LARGEST_SHARE = 0.2
+# The area over that of the ellipse, A / (4 pi sqrt(det C)), is more than this; a square has .955, but small
+# discs are stairs.
+LEAST_LIKENESS = 0.93
+# From so many pixels on stairs no longer matter.
+SHARP_PIXELS = 120
+# A disc of so many pixels has more than this likeness to an ellipse.
+LEAST_LIKENESS_SHARP = 0.975
+# Half the shorter axis is more than this, pixels.
+LEAST_HALF_AXIS = 0.9
+# One axis is less than so many times the other.
+MOST_AXIS_RATIO = 12.0
+# More spots than this are noise.
+MOST_SPOTS = 4000
+# An outline is sought along so many rays.
+RAY_COUNT = 48
+# A ray has so many samples.
+RAY_SAMPLES = 41
+# The outline is sought from this share of the radius on.
+INNER_RADIUS = 0.45
+# The outline is sought up to this many radii; a neighbour begins beyond.
+OUTER_RADIUS = 1.45
+# The levels inside and outside are taken over this share of a radius at either end.
+LEVEL_RADII = 0.25
+# An outline is refined so many times.
+REFINING_ROUNDS = 3
+# Inside and outside differ by more than so many grey levels.
+LEAST_CONTRAST = 8.0
+# An outline's rms about its ellipse is less than this, radii.
+MOST_ROUGHNESS = 0.12
+# At least this share of the rays meets the outline.
+LEAST_RAYS_SHARE = 0.9
+# The picture is smoothed with this sigma, pixels.
+SMOOTHING_SIGMA = 0.7
 
 
 def spots(grey: ndarray) -> Iterator[Ellipses]:
@@ -49,11 +72,11 @@ def spots(grey: ndarray) -> Iterator[Ellipses]:
         grey: (h,w) uint8.
     """
     longer = max(grey.shape)
-    smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING)
-    for share in SURROUNDINGS:
+    smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA)
+    for share in WINDOW_SHARES:
         window = max(3, int(share * longer)) | 1
         level = cv2.blur(smooth, (window, window), borderType=cv2.BORDER_REPLICATE)
-        yield _elliptic(smooth < level.astype(np.int16) - STEP)
+        yield _elliptic(smooth < level.astype(np.int16) - LEAST_STEP)
     level, _ = cv2.threshold(smooth, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
     yield _elliptic(smooth <= level)
 
@@ -64,7 +87,7 @@ def _elliptic(dark: ndarray) -> Ellipses:
     left, top, width, height, area = stats.T
     inside = (left > 0) & (top > 0) & (left + width < dark.shape[1]) & (top + height < dark.shape[0])
     fits = inside & (area >= FEWEST_PIXELS) & (area < LARGEST_SHARE * dark.size)
-    fits &= area > 0.5 * np.pi / (4.0 * np.sqrt(2.0)) / MOST_OBLONG * np.minimum(width, height) ** 2
+    fits &= area > 0.5 * np.pi / (4.0 * np.sqrt(2.0)) / MOST_AXIS_RATIO * np.minimum(width, height) ** 2
     fits[0] = False
     if not 0 < fits.sum() <= MOST_SPOTS:
         return Ellipses(np.zeros((0, 2)), np.zeros((0, 2, 2)))
@@ -72,9 +95,9 @@ def _elliptic(dark: ndarray) -> Ellipses:
     which = np.flatnonzero(fits)
     values, vectors = np.linalg.eigh(covariances)
     like = area[which] / (4.0 * np.pi * np.sqrt(np.maximum(values.prod(1), 1e-12)))
-    least = np.where(area[which] < SHARP_PIXELS, LEAST_LIKE, LEAST_LIKE_SHARP)
+    least = np.where(area[which] < SHARP_PIXELS, LEAST_LIKENESS, LEAST_LIKENESS_SHARP)
     radii = 2.0 * np.sqrt(np.maximum(values, 1e-12))
-    good = (like > least) & (radii[:, 0] > LEAST_WIDTH) & (radii[:, 1] < MOST_OBLONG * radii[:, 0])
+    good = (like > least) & (radii[:, 0] > LEAST_HALF_AXIS) & (radii[:, 1] < MOST_AXIS_RATIO * radii[:, 0])
     axes = np.einsum("nij,nj,nkj->nik", vectors, radii, vectors)
     return Ellipses(middles[which][good], axes[good])
 
@@ -97,11 +120,11 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Ellipses:
         grey: (h,w) uint8.
         rough: ellipses that are right to a quarter of their size.
     """
-    smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING)
-    angle = 2.0 * np.pi * np.arange(RAYS) / RAYS
+    smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA)
+    angle = 2.0 * np.pi * np.arange(RAY_COUNT) / RAY_COUNT
     rays = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     fitted = rough
-    for _ in range(ROUNDS):
+    for _ in range(REFINING_ROUNDS):
         known = np.isfinite(fitted.centres[:, 0])
         centres, axes = fitted.centres[known], fitted.axes[known]
         if not len(centres):
@@ -114,9 +137,9 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Ellipses:
             np.nan_to_num(rims - found.centres[:, None]).swapaxes(1, 2),
         )
         off = np.where(np.isfinite(radii), np.hypot(*places.swapaxes(0, 1)) - 1.0, np.nan)
-        seen = np.isfinite(off).mean(1) >= LEAST_SEEN
+        seen = np.isfinite(off).mean(1) >= LEAST_RAYS_SHARE
         rough_px = np.sqrt(np.nanmean(np.where(seen[:, None], off, 1.0) ** 2, axis=1))
-        good = seen & (rough_px < MOST_ROUGH)
+        good = seen & (rough_px < MOST_ROUGHNESS)
         new_centres, new_axes = np.full_like(fitted.centres, np.nan), np.full_like(fitted.axes, np.nan)
         which = np.flatnonzero(known)[good]
         new_centres[which], new_axes[which] = found.centres[good], found.axes[good]
@@ -128,9 +151,9 @@ def _outline(smooth: ndarray, centres: ndarray, arms: Float[ndarray, "n 2 k"]) -
     """How far along each ray, in radii, grey rises through the middle between inside and outside; NaN where
     it does not, or where the ray leaves the picture.
     """
-    radius = np.linspace(INSIDE, OUTSIDE, SAMPLES)
+    radius = np.linspace(INNER_RADIUS, OUTER_RADIUS, RAY_SAMPLES)
     x, y = (centres[:, i, None, None] + arms[:, i, :, None] * radius for i in (0, 1))
-    shape = (-1, RAYS * SAMPLES)
+    shape = (-1, RAY_COUNT * RAY_SAMPLES)
     grey = cv2.remap(
         smooth.astype(np.float32),
         x.reshape(shape).astype(np.float32),
@@ -138,7 +161,7 @@ def _outline(smooth: ndarray, centres: ndarray, arms: Float[ndarray, "n 2 k"]) -
         cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REPLICATE,
     ).reshape(x.shape)
-    ends = max(2, round(SAMPLES * LEVELS / (OUTSIDE - INSIDE)))
+    ends = max(2, round(RAY_SAMPLES * LEVEL_RADII / (OUTER_RADIUS - INNER_RADIUS)))
     inside = np.median(grey[..., :ends], axis=(1, 2))[:, None]
     outside = np.median(grey[..., -ends:], axis=2)
     level = 0.5 * (inside + outside)[..., None]

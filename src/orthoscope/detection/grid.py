@@ -19,14 +19,16 @@ from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["GridShape", "cross", "grid_shape", "lattice", "nearest_neighbour", "one_line_more"]
 
-EXACT = (4, 3)  # corners of a line and degree: through these the polynomial goes
-SMOOTH = (5, 2)  # and between these
+# Through so many corners of a line the polynomial of this degree goes exactly.
+EXACT_FIT = (4, 3)
+# Between so many corners of a line the polynomial of this degree goes smoothly.
+SMOOTH_FIT = (5, 2)
 
 
 class GridShape(NamedTuple):
     """At each of m corners.
 
-    Args:
+    Attributes:
         along, down: (m,2) one step along the row and along the column, pixels.
         bend_along, bend_down: (m,) curvature of those lines, 1/px, positive towards +90 degrees (from x to y)
             of their direction.
@@ -104,9 +106,9 @@ def _along_lines(
         which = np.stack(lines)
         if len(steps) > 1:
             _, slope[which], turn[which] = np.einsum(
-                "kij,ljc->klic", _polynomials(steps, *EXACT), corners[which]
+                "kij,ljc->klic", _polynomials(steps, *EXACT_FIT), corners[which]
             )
-            smooth[which] = np.einsum("ij,ljc->lic", _polynomials(steps, *SMOOTH)[0], corners[which])
+            smooth[which] = np.einsum("ij,ljc->lic", _polynomials(steps, *SMOOTH_FIT)[0], corners[which])
     alone = np.isnan(slope[:, 0])
     if alone.all():
         return np.zeros_like(slope), turn, smooth

@@ -21,10 +21,14 @@ from orthoscope.geometry.arrays import Float, ndarray
 __all__ = ["opencv_boards"]
 
 Finder = Callable[[ndarray, tuple[int, int]], ndarray | None]
-SMALLEST = 15  # px: OpenCV's finders stumble over pictures that are smaller
-FARTHEST_STRAY = 0.25  # of a square, from the parabolas of a corner's row and column
-LEAST_ALTERNATING = 0.8  # of the corners: glare and shadow hide some
-MOST_CONTRARY = 0.05  # of the corners
+# OpenCV's finders stumble over pictures with a shorter side, pixels.
+SMALLEST_SIDE = 15
+# A corner strays from the parabolas of its row and column by at most this share of a square.
+FARTHEST_STRAY_SHARE = 0.25
+# At least this share of the corners alternates; glare and shadow hide some.
+LEAST_ALTERNATING_SHARE = 0.8
+# At most this share of the corners alternates the wrong way.
+MOST_CONTRARY_SHARE = 0.05
 
 
 def opencv_boards(grey: ndarray, columns: int, rows: int) -> Iterator[Float[ndarray, "m 2"]]:
@@ -44,7 +48,7 @@ def _sightings(grey: ndarray, columns: int, rows: int) -> Iterator[Float[ndarray
     tried: set[tuple[Finder, tuple[int, ...]]] = set()
     for rung in LADDER:
         copy = resized(grey, rung.side)
-        if (rung.find, copy.shape) in tried or min(copy.shape) < SMALLEST:
+        if (rung.find, copy.shape) in tried or min(copy.shape) < SMALLEST_SIDE:
             continue
         tried.add((rung.find, copy.shape))
         found = rung.find(copy, (columns, rows))
@@ -81,11 +85,13 @@ def _is_grid(grey: ndarray, corners: ndarray, columns: int, rows: int) -> bool:
     shape = grid_shape(corners, lattice(columns, rows))
     turn = cross(shape.along, shape.down)
     inside = ((corners >= 0) & (corners <= np.array(grey.shape[::-1]) - 1)).all()
-    return bool(inside and ((turn > 0).all() or (turn < 0).all()) and shape.stray.max() <= FARTHEST_STRAY)
+    return bool(
+        inside and ((turn > 0).all() or (turn < 0).all()) and shape.stray.max() <= FARTHEST_STRAY_SHARE
+    )
 
 
 def _alternates(grey: ndarray, corners: ndarray, columns: int, rows: int) -> bool:
     """Whether the squares between corners are bright and dark by turns."""
     signs = alternating(grey, corners.reshape(rows, columns, 2))
     contrary, agree = sorted([(signs > 0).mean(), (signs < 0).mean()])
-    return bool(agree >= LEAST_ALTERNATING and contrary <= MOST_CONTRARY)
+    return bool(agree >= LEAST_ALTERNATING_SHARE and contrary <= MOST_CONTRARY_SHARE)

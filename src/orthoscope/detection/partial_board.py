@@ -24,21 +24,30 @@ from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 
 __all__ = ["Grid", "alternating", "filled", "grid_of", "laid_out", "placements"]
 
-FARTHEST_STRAY = 0.3  # of a step, from the parabolas of a corner's row and column
-CLEARINGS = 12  # times that strays are taken out, those nearly as far off as the worst together
-NEARLY_WORST = 0.8  # of the worst stray
-LEAST_LEFT = 0.5  # of the corners, after that: with fewer it was a lattice by chance
-LEAST_CONTRAST = 0.3  # of the usual strength of a corner
-LINE_GOES_ON = 0.6  # of the corners of a line that are in the picture
-LINE_ENDS = 0.75  # of its squares: they alternate, and behind the black ones is white
-THIN = 0.34  # of the next line's corners: a line at the rim with fewer, and fewer than three, is chance
-LINES_BEFORE = 4  # which a line is compared with
+# A corner strays from the parabolas of its row and column by at most this share of a step.
+FARTHEST_STRAY_SHARE = 0.3
+# Strays are taken out at most so many times, those nearly as far off as the worst together.
+CLEARING_ROUNDS = 12
+# Beyond this share of the worst stray a corner is nearly as far off.
+NEARLY_WORST_SHARE = 0.8
+# At least this share of the corners is left when strays are taken out; with fewer it was a lattice by chance.
+LEAST_LEFT_SHARE = 0.5
+# A corner has more than this share of the usual strength of one.
+LEAST_CONTRAST_SHARE = 0.3
+# A line goes on where at least this share of its corners that are in the picture stands out.
+GOING_ON_SHARE = 0.6
+# The board ends where this share of a line's squares alternates, with white behind them.
+BLANK_SQUARES_SHARE = 0.75
+# A line at the rim with fewer than three corners, and less than this share of the next line's, is chance.
+THIN_LINE_SHARE = 0.34
+# A line is compared with so many lines before it.
+COMPARED_LINES = 4
 
 
 class Grid(NamedTuple):
     """A lattice as a grid.
 
-    Args:
+    Attributes:
         corners: (rows, columns, 2) pixels, gaps filled.
         seen: (rows, columns) whether a corner was seen there.
         bright: whether the square between +column and +row of the first corner is the bright one.
@@ -79,8 +88,15 @@ def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
     return _taken_further(grey, grid, seen, bright, most)
 
 
-def placements(grid: Grid, columns: int, rows: int) -> list[Int[ndarray, "r c"]]:
-    """Ids (rows, columns) of the grid's corners, seen or not, for each way it can lie on a board."""
+def placements(grid: Grid, columns: int, rows: int, *, negative: bool = False) -> list[Int[ndarray, "r c"]]:
+    """Ids (rows, columns) of the grid's corners, seen or not, for each way it can lie on a board.
+
+    Args:
+        grid: the lattice.
+        columns: inner corners of the board.
+        rows: likewise.
+        negative: whether to take white for black.
+    """
     as_said, inverted = [], []
     for quarters in range(4):
         seen = np.rot90(grid.seen, quarters)
@@ -100,6 +116,8 @@ def placements(grid: Grid, columns: int, rows: int) -> list[Int[ndarray, "r c"]]
                     continue
                 ids = np.add.outer((np.arange(height) + row) * columns, np.arange(width) + column)
                 (inverted if dark == bright else as_said).append(np.rot90(ids, -quarters))
+    if negative:
+        return inverted
     if (columns + rows) % 2 or (columns == rows and columns % 2):  # white for black is the board turned
         return as_said
     whole = grid.seen.size == columns * rows
@@ -144,13 +162,13 @@ def _foreseen(grid: ndarray, turn: int) -> list[ndarray]:
 def _without_strays(found: CornerLattice) -> CornerLattice | None:
     """The lattice without corners that are off their neighbours' lines, the worst first."""
     pixels, cells, bright = found
-    for _ in range(CLEARINGS):
-        if len(pixels) < max(4, LEAST_LEFT * len(found.pixels)):
+    for _ in range(CLEARING_ROUNDS):
+        if len(pixels) < max(4, LEAST_LEFT_SHARE * len(found.pixels)):
             return None
         stray = grid_shape(pixels, cells.astype(float)).stray
-        if stray.max() <= FARTHEST_STRAY:
+        if stray.max() <= FARTHEST_STRAY_SHARE:
             break
-        keep = stray <= max(FARTHEST_STRAY, NEARLY_WORST * stray.max())
+        keep = stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())
         pixels, cells, bright = pixels[keep], cells[keep], bright[keep]
     cells = cells - cells.min(0)
     return CornerLattice(pixels, cells, bright)
@@ -160,7 +178,7 @@ def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:
     """Where the squares around a corner are bright and dark as they must be there, with contrast enough."""
     strength = alternating(grey, grid) * (1.0 if bright else -1.0)
     usual = np.median(strength[strength > 0]) if (strength > 0).any() else np.inf
-    return strength > LEAST_CONTRAST * usual
+    return strength > LEAST_CONTRAST_SHARE * usual
 
 
 def _box(seen: Bool[ndarray, "r c"]) -> tuple[slice, slice] | None:
@@ -175,7 +193,8 @@ def _box(seen: Bool[ndarray, "r c"]) -> tuple[slice, slice] | None:
             (part[:, -1], part[:, -2]),
         ]
         thin = [
-            line.sum() == 0 or (line.sum() < 3 and line.sum() < THIN * next_.sum()) for line, next_ in lines
+            line.sum() == 0 or (line.sum() < 3 and line.sum() < THIN_LINE_SHARE * next_.sum())
+            for line, next_ in lines
         ]
         if not any(thin):
             return slice(top, bottom), slice(left, right)
@@ -194,7 +213,7 @@ def _taken_further(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool, mo
                 one_line_more(grid) if len(grid) > 2 else np.concatenate([grid, 2 * grid[-1:] - grid[-2:-1]])
             )
             stands = _next_line_stands(grey, more, bright)
-            if not stands.any() or stands.sum() < LINE_GOES_ON * _in_picture(grey, more[-1]).sum():
+            if not stands.any() or stands.sum() < GOING_ON_SHARE * _in_picture(grey, more[-1]).sum():
                 break
             grid, seen = more, np.concatenate([seen, stands[None]])
         ends.append(_ends(grey, grid))
@@ -207,7 +226,7 @@ def _taken_further(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool, mo
 
 def _next_line_stands(grey: ndarray, more: ndarray, bright: bool) -> ndarray:
     """Which corners of the last row are the board's, as those of the rows before it are."""
-    strength = alternating(grey, more)[-1 - LINES_BEFORE :] * (1.0 if bright else -1.0)
+    strength = alternating(grey, more)[-1 - COMPARED_LINES :] * (1.0 if bright else -1.0)
     before = strength[:-1]
     usual = np.median(before[before > 0]) if (before > 0).any() else np.inf
     return strength[-1] > 0.5 * usual
@@ -232,8 +251,11 @@ def _ends(grey: ndarray, grid: ndarray) -> bool:
     dark = near < before
     same = np.abs(far - near) < 2.0 * contrast
     alternates = np.abs(near - before) > 0.5 * np.median(np.abs(near - before))
-    paper = beyond > level
-    return bool((same & alternates).mean() >= LINE_ENDS and dark.any() and paper[dark].mean() >= LINE_ENDS)
+    paper = beyond > level  # behind the bright ones too: where the board goes on, there are dark squares
+    if dark.all() or not dark.any():
+        return False
+    ends = min((same & alternates).mean(), paper[dark].mean(), paper[~dark].mean())
+    return bool(ends >= BLANK_SQUARES_SHARE)
 
 
 def _in_picture(grey: ndarray, places: ndarray) -> ndarray:

@@ -22,16 +22,26 @@ from orthoscope.geometry.arrays import Bool, Float, ndarray
 
 __all__ = ["Refined", "refined"]
 
-NEAR_SHARE = 0.25  # of a square: half the window of cornerSubPix
-SHARE = 0.45  # of a square: half the window of the fit
-USUAL = 50.0  # px a square: larger ones are reduced to about this
-REACH = 18.0  # px: half the largest window
-SMOOTHING = 0.5  # px, sigma: what a camera sharpened until it jumps from pixel to pixel has slopes again
-ARM_USED = 0.85  # of an arm: blur reaches over its side
-NOISE_LEFT = 0.41  # of its variance, after smoothing
-SADDLE_SQUARE = 0.6  # mean square of a blurred saddle over its window, about
-FARTHEST = 0.35  # of a square: a fit that ends farther from its start is not believed,
-LEAST_EXPLAINED = 0.85  # nor one that explains less of what is not noise of its window's variance
+# Half the window of cornerSubPix is this share of a square.
+NEAR_SHARE = 0.25
+# Half the window of the fit is this share of a square.
+WINDOW_SHARE = 0.45
+# Larger squares are reduced to about this, pixels.
+USUAL_SQUARE = 50.0
+# Half the largest window is this, pixels.
+LARGEST_REACH = 18.0
+# With this sigma, pixels, what a camera sharpened until it jumps from pixel to pixel has slopes again.
+SMOOTHING_SIGMA = 0.5
+# Of an arm this share is used, since blur reaches over its side.
+ARM_SHARE = 0.85
+# Smoothing leaves this share of the noise's variance.
+NOISE_LEFT_SHARE = 0.41
+# The mean square of a blurred saddle over its window is about this.
+SADDLE_MEAN_SQUARE = 0.6
+# A fit that ends farther from its start than this share of a square is not believed.
+FARTHEST_SHARE = 0.35
+# A fit explains at least this share of what is not noise of its window's variance, or is not believed.
+LEAST_EXPLAINED_SHARE = 0.85
 
 
 class Refined(NamedTuple):
@@ -49,7 +59,7 @@ def refined(
     places: Float[ndarray, "m 2"],
     *,
     approach: bool = True,
-    arm: float = 1.0,
+    arm: float | Float[ndarray, " m"] = 1.0,
 ) -> Refined:
     """Corners from ones that are right to a fifth of a step of their lattice.
 
@@ -57,27 +67,27 @@ def refined(
         grey: (h,w) uint8.
         rough: (m,2) pixels.
         places: (m,2) column and row of each in the lattice, in steps.
-        arm: how far from the edges something else than squares is printed, in steps.
+        arm: how far from the edges something else than squares is printed, in steps; of all or of each.
         approach: whether cornerSubPix comes near first; not where it went astray before.
     """
     square = nearest_neighbour(rough, places)
-    shrink = max(1, round(float(np.median(square)) / USUAL))
+    shrink = max(1, round(float(np.median(square)) / USUAL_SQUARE))
     first, part = _surroundings(grey, rough, square.max())
     small = _reduced(part, shrink)
     near = (rough - first + 0.5) / shrink - 0.5
     near = _near(small, near, places) if approach else near
     shape = grid_shape(near, places)
     saddles = fit_saddles(
-        cv2.GaussianBlur(small, (0, 0), SMOOTHING),
+        cv2.GaussianBlur(small, (0, 0), SMOOTHING_SIGMA),
         near,
         _window(shape.along),
         _window(shape.down),
         bends=np.stack([shape.bend_along, shape.bend_down], axis=1),
         arms=_arms(shape, arm),
     )
-    allowed = np.maximum(FARTHEST * nearest_neighbour(near, places), 1.0)
-    signal = SADDLE_SQUARE * saddles.contrast**2
-    least = LEAST_EXPLAINED * signal / np.maximum(signal + _noise(small) * NOISE_LEFT, 1e-9)
+    allowed = np.maximum(FARTHEST_SHARE * nearest_neighbour(near, places), 1.0)
+    signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
+    least = LEAST_EXPLAINED_SHARE * signal / np.maximum(signal + _noise(small) * NOISE_LEFT_SHARE, 1e-9)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     return Refined(pixels, believed)
@@ -110,7 +120,7 @@ def _noise(grey: ndarray) -> float:
 
 def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
     """cornerSubPix with a window that suits each corner's own squares."""
-    radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, places)), 2, REACH).astype(int)
+    radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, places)), 2, LARGEST_REACH).astype(int)
     places = np.clip(corners, 0, np.array(grey.shape[::-1]) - 1).astype(np.float32)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-2)
     for size in np.unique(radius):
@@ -122,12 +132,12 @@ def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
     return places.astype(float)
 
 
-def _arms(shape: GridShape, arm: float) -> Float[ndarray, " m"]:
+def _arms(shape: GridShape, arm: float | Float[ndarray, " m"]) -> Float[ndarray, " m"]:
     """An arm of so many steps as a share of each corner's window; 1 where it reaches over it."""
     longest = np.maximum(np.maximum(np.hypot(*shape.along.T), np.hypot(*shape.down.T)), 1e-9)
-    return np.minimum(ARM_USED * arm / np.minimum(SHARE, REACH / longest), 1.0)
+    return np.minimum(ARM_SHARE * arm / np.minimum(WINDOW_SHARE, LARGEST_REACH / longest), 1.0)
 
 
 def _window(square: Float[ndarray, "m 2"]) -> Float[ndarray, "m 2"]:
     """From a corner to the side of its window, given one square."""
-    return square * np.minimum(SHARE, REACH / np.maximum(np.hypot(*square.T), 1e-9))[:, None]
+    return square * np.minimum(WINDOW_SHARE, LARGEST_REACH / np.maximum(np.hypot(*square.T), 1e-9))[:, None]

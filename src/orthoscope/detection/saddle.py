@@ -26,26 +26,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.saddle_windows import COLUMNS, Shapes, Windows
+from orthoscope.detection.saddle_windows import COLUMN_COUNT, Shapes, Windows
 from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["Saddles", "fit_saddles"]
 
+# A stage has a share of the window, and pixels: a corner that moves less has arrived (what is left is its
+# square).
 STAGES = (
     (0.5, 0.05),
     (1.0, 0.01),
-)  # share of the window, and px: a corner that moves less has arrived (what is left is its square)
-STEPS = 8  # of each stage, at most
-LEAST_SIDE = 6.0  # px: half the smallest window that is only a share of one
-FEW = 12  # corners that tell the blur
-# px: a pixel's own width; a sharpened edge is steeper, and without a floor the steps then jump from pixel to
-# pixel
-LEAST_BLUR = 0.75
-LARGEST_STEP = np.array([1.0, 1.0, 0.2, 0.2, 0.5])  # of x, y (px), t1, t2 (radians), log w
-DAMPING = np.array(
-    [1e-3] * 5 + [1e-6] * 2 + [0.03] * 2
-)  # of each column's own square; light changes little in a window
-PIXELS_AT_ONCE = 60_000  # of all windows together, so that the arrays stay in cache
+)
+# Each stage has at most so many steps.
+STAGE_STEPS = 8
+# Half the smallest window that is only a share of one is this, pixels.
+LEAST_HALF_WINDOW = 6.0
+# So many corners tell the blur.
+BLUR_CORNERS = 12
+# A blur is at least a pixel's own width: a sharpened edge is steeper, and without a floor the steps then jump
+# from pixel to pixel.
+LEAST_BLUR_PX = 0.75
+# A step of x, y (px), t1, t2 (radians) and log w is at most this.
+LARGEST_STEP = np.array([1.0, 1.0, 0.2, 0.2, 0.5])
+# Each column's own square is raised by this share of it; light changes little in a window.
+DAMPING = np.array([1e-3] * 5 + [1e-6] * 2 + [0.03] * 2)
+# So many pixels of all windows are done together, so that the arrays stay in cache.
+PIXELS_AT_ONCE = 60_000
 
 
 class Saddles(NamedTuple):
@@ -69,10 +75,14 @@ def fit_saddles(
 ) -> Saddles:
     """The saddles near `start`.
 
-    grey: (h,w) uint8. along, down: from a corner to the sides of its window, pixels, in the directions of its
-    two edges. bends: curvature of the two edges, 1/px. arms: (n,) how
-    far from the edges, as a share of the window, its corners are left out, where something else is printed.
     Where the steps do not settle the last place is given, with what it explains.
+
+    Args:
+        grey: (h,w) uint8.
+        along, down: from a corner to the sides of its window, pixels, in the directions of its two edges.
+        bends: curvature of the two edges, 1/px.
+        arms: (n,) how far from the edges, as a share of the window, its corners are left out, where something
+            else is printed.
     """
     fit = _Fit(grey, start, along, down, bends, np.ones(len(start)) if arms is None else arms)
     fit.begin_with_one_blur()
@@ -97,7 +107,7 @@ class _Fit:
 
     def begin_with_one_blur(self) -> None:
         """The middle one of a few corners' blurs, for all."""
-        few = self.by_size[:: max(1, len(self.by_size) // FEW)]
+        few = self.by_size[:: max(1, len(self.by_size) // BLUR_CORNERS)]
         self.settle(few, *STAGES[0])
         self.shapes.blur[:] = np.median(self.shapes.blur[few])
 
@@ -106,7 +116,7 @@ class _Fit:
         steps.
         """
         side = np.minimum(np.hypot(*self.along.T), np.hypot(*self.down.T))
-        shares = np.clip(LEAST_SIDE / np.maximum(side, 1e-9), share, 1.0)[:, None]
+        shares = np.clip(LEAST_HALF_WINDOW / np.maximum(side, 1e-9), share, 1.0)[:, None]
         at_once = max(1, int(PIXELS_AT_ONCE / max((shares[:, 0] ** 2 * self.area).max(), 1.0)))
         for i in range(0, len(which), at_once):
             some = which[i : i + at_once]
@@ -118,7 +128,7 @@ class _Fit:
                 self.arms[some] / shares[some, 0],
             )
             rows = np.arange(len(some))
-            for _ in range(STEPS):
+            for _ in range(STAGE_STEPS):
                 moved = self._step(
                     some[rows], windows.sums(rows, self.shapes.of(some[rows])), windows.level[rows]
                 )
@@ -139,7 +149,7 @@ class _Fit:
         step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
         shapes.places[here] += step[:, :2]
         shapes.angles[here] += step[:, 2:4]
-        shapes.blur[here] = np.maximum(shapes.blur[here] * np.exp(step[:, 4]), LEAST_BLUR)
+        shapes.blur[here] = np.maximum(shapes.blur[here] * np.exp(step[:, 4]), LEAST_BLUR_PX)
         shapes.relief[here] = np.clip(contrast / np.maximum(level + solution[:, 6], 1.0), -1.0, 1.0)
         return np.abs(step[:, :2]).max(1)
 
@@ -148,7 +158,7 @@ def _solved(sums: Float[ndarray, "n 10 10"]) -> tuple[Float[ndarray, "n 9"], Flo
     """The damped least squares solution in each window, and the share of its variance that this explains."""
     normal, right, square = sums[:, :-1, :-1], sums[:, :-1, -1], sums[:, -1, -1]
     diagonal = np.einsum("npp->np", normal)
-    damped = normal + np.eye(COLUMNS) * (DAMPING * diagonal + 1e-6)[:, None]
+    damped = normal + np.eye(COLUMN_COUNT) * (DAMPING * diagonal + 1e-6)[:, None]
     solution = np.linalg.solve(damped, right[:, :, None])[:, :, 0]
     left = square - (solution * (2.0 * right - (normal @ solution[:, :, None])[:, :, 0])).sum(1)
     variance = square - right[:, 6] ** 2 / np.maximum(diagonal[:, 6], 1e-9)

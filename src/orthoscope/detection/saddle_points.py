@@ -23,19 +23,26 @@ from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["SaddlePoints", "saddle_points"]
 
-BLUR = 1.5  # px, sigma, before derivatives
-RADIUS = 5.0  # px of the circle
-AROUND = 32  # places on the circle
-LEAST_EVEN = 0.5  # of `even`
-LEAST_SHARE = 0.02  # of the strongest saddle's strength: weaker ones are not looked at
-LEAST_CONTRAST = 2.5  # grey levels, rms along the circle
-MOST = 2500  # saddles that are looked at, the strongest first
+# The picture is blurred with this sigma, pixels, before derivatives.
+BLUR_SIGMA = 1.5
+# The circle about a saddle has this radius, pixels.
+CIRCLE_RADIUS = 5.0
+# So many places on the circle are looked at.
+CIRCLE_SAMPLES = 32
+# Opposite places on the circle correlate by more than this.
+LEAST_EVENNESS = 0.5
+# Saddles with less than this share of the strongest one's strength are not looked at.
+LEAST_STRENGTH_SHARE = 0.02
+# The rms along the circle is more than so many grey levels.
+LEAST_CONTRAST = 2.5
+# So many saddles are looked at, the strongest first.
+MOST_SADDLES = 2500
 
 
 class SaddlePoints(NamedTuple):
     """n corners of four squares.
 
-    Args:
+    Attributes:
         pixels: (n,2) to about half a pixel.
         edges: (n,2) angles of the two edges, radians, 0 to pi, the bright square lying between the first and
             the second.
@@ -47,23 +54,23 @@ class SaddlePoints(NamedTuple):
 
 def saddle_points(grey: ndarray) -> SaddlePoints:
     """The corners of four squares in a picture (h,w) uint8."""
-    smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), BLUR)
+    smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), BLUR_SIGMA)
     strength = _strength(smooth)
     x, y = _peaks(strength)
     pixels = np.stack([x, y], axis=1).astype(np.float32)
     pixels += _to_peak(strength, x, y)
-    angles = 2 * np.pi * np.arange(AROUND) / AROUND
-    circle = (RADIUS * np.stack([np.cos(angles), np.sin(angles)])).astype(np.float32)
+    angles = 2 * np.pi * np.arange(CIRCLE_SAMPLES) / CIRCLE_SAMPLES
+    circle = (CIRCLE_RADIUS * np.stack([np.cos(angles), np.sin(angles)])).astype(np.float32)
     at = pixels[:, :, None] + circle
     if not len(at):
         return SaddlePoints(np.zeros((0, 2)), np.zeros((0, 2)))
     values = cv2.remap(smooth, at[:, 0].copy(), at[:, 1].copy(), cv2.INTER_LINEAR)
     values = values - values.mean(1, keepdims=True)
     power = np.maximum((values**2).sum(1), 1e-9)
-    even = (values * np.roll(values, AROUND // 2, axis=1)).sum(1) / power
+    even = (values * np.roll(values, CIRCLE_SAMPLES // 2, axis=1)).sum(1) / power
     sign = values > 0
     changes = sign != np.roll(sign, -1, axis=1)
-    good = (changes.sum(1) == 4) & (even > LEAST_EVEN) & (power > AROUND * LEAST_CONTRAST**2)
+    good = (changes.sum(1) == 4) & (even > LEAST_EVENNESS) & (power > CIRCLE_SAMPLES * LEAST_CONTRAST**2)
     return SaddlePoints(pixels[good].astype(float), _edges(values[good], changes[good]))
 
 
@@ -77,15 +84,15 @@ def _strength(smooth: ndarray) -> ndarray:
 
 def _peaks(strength: ndarray) -> tuple[ndarray, ndarray]:
     """Columns and rows of the strongest places among their neighbours."""
-    reach = int(np.ceil(RADIUS)) + 1
+    reach = int(np.ceil(CIRCLE_RADIUS)) + 1
     peak = (strength >= cv2.dilate(strength, np.ones((7, 7), np.uint8))) & (
-        strength > LEAST_SHARE**2 * strength.max(initial=0.0)
+        strength > LEAST_STRENGTH_SHARE**2 * strength.max(initial=0.0)
     )
     peak[:reach] = peak[-reach:] = False
     peak[:, :reach] = peak[:, -reach:] = False
     y, x = np.nonzero(peak)
-    if len(y) > MOST:
-        first = np.argpartition(-strength[y, x], MOST)[:MOST]
+    if len(y) > MOST_SADDLES:
+        first = np.argpartition(-strength[y, x], MOST_SADDLES)[:MOST_SADDLES]
         y, x = y[first], x[first]
     return x, y
 
@@ -106,7 +113,7 @@ def _edges(values: ndarray, changes: ndarray) -> Float[ndarray, "n 2"]:
     """
     following = np.roll(values, -1, axis=1)
     share = values / np.where(changes, values - following, 1.0)
-    angle = 2 * np.pi * (np.arange(AROUND) + share) / AROUND
+    angle = 2 * np.pi * (np.arange(CIRCLE_SAMPLES) + share) / CIRCLE_SAMPLES
     rising = changes & (following > 0)
     edges = []
     for which in (rising, changes & ~rising):

@@ -21,17 +21,23 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
-__all__ = ["COLUMNS", "Shapes", "Windows"]
+__all__ = ["COLUMN_COUNT", "Shapes", "Windows"]
 
-COLUMNS = 9  # besides the picture
-NEARLY_OUTSIDE = 0.93  # of a window: beyond, a pixel's weight is below 2 %
+# A window has so many columns besides the picture.
+COLUMN_COUNT = 9
+# Beyond this share of a window a pixel's weight is below 2 %.
+INNER_SHARE = 0.93
 
 
 class Shapes(NamedTuple):
     """What is known of n saddles so far.
 
-    places: (n,2) pixels. angles: (n,2) of the two edges, radians. blur: (n,) w, pixels. bends: (n,2)
-    curvatures, 1/px. relief: (n,) r = C / m, 0 where it is not known yet.
+    Attributes:
+        places: (n,2) pixels.
+        angles: (n,2) of the two edges, radians.
+        blur: (n,) w, pixels.
+        bends: (n,2) curvatures, 1/px.
+        relief: (n,) r = C / m, 0 where it is not known yet.
     """
 
     places: Float[ndarray, "n 2"]
@@ -48,10 +54,12 @@ class Shapes(NamedTuple):
 class Windows:
     """The pixels of n windows, k each.
 
-    grey: (h,w) uint8. start: (n,2) where the corners are to a few pixels. along, down: (n,2) from a corner to
-    the sides of its window. arms: (n,) how far
-    from the edges the window's corners are left out, as a share of it. level: (n,) mean grey, which the sums
-    do without.
+    Args:
+        grey: (h,w) uint8.
+        start: (n,2) where the corners are to a few pixels.
+        along, down: (n,2) from a corner to the sides of its window.
+        arms: (n,) how far from the edges the window's corners are left out, as a share of it.
+        level: (n,) mean grey, which the sums do without.
     """
 
     def __init__(
@@ -86,7 +94,7 @@ class Windows:
         bend1, bend2 = (0.5 * shapes.blur * shapes.bends.T)[:, :, None].astype(np.float32)
         d1 -= bend1 * a1 * a1
         d2 += bend2 * a2 * a2
-        columns = np.empty((len(which), COLUMNS + 1, d1.shape[1]), dtype=np.float32)
+        columns = np.empty((len(which), COLUMN_COUNT + 1, d1.shape[1]), dtype=np.float32)
         f1, f2, f1_a1, f2_a2, blurring, saddle, one, across, upright, picture = columns.transpose(1, 0, 2)
         np.multiply(_root_weights(u, v, self._arms[which]), self._inside[which], out=one)
         e1, e2 = np.tanh(d1), np.tanh(d2)
@@ -128,7 +136,7 @@ def _reached(to_window: Float[ndarray, "2 n 2"], reach: int) -> Int[ndarray, "2 
     out = (to_window.reshape(-1, 2).astype(np.float32) @ offsets.astype(np.float32)).reshape(
         2, to_window.shape[1], -1
     )
-    return offsets[:, np.maximum(*np.abs(out, out=out)).min(0) < NEARLY_OUTSIDE]
+    return offsets[:, np.maximum(*np.abs(out, out=out)).min(0) < INNER_SHARE]
 
 
 def _root_weights(u: ndarray, v: ndarray, arms: ndarray) -> ndarray:

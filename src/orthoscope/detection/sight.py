@@ -6,19 +6,24 @@ from typing import NamedTuple
 
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
-__all__ = ["Sight", "Unseen"]
+__all__ = ["TWICE", "Sight", "Unseen"]
+
+# The remark where two boards alike are in a photograph.
+TWICE = "is in it more than once; the one that shows most of itself was taken"
 
 
 class Sight(NamedTuple):
     """Corners that were found.
 
-    Args:
+    Attributes:
         ids: (n,) rows of the target's points, ascending.
         pixels: (n,2) where they are.
+        remark: what a person should know of the choice, as it is told after the target's name; mostly empty.
     """
 
     ids: Int[ndarray, " n"]
     pixels: Float[ndarray, "n 2"]
+    remark: str = ""
 
 
 class Unseen(NamedTuple):

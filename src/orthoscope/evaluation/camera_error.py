@@ -27,25 +27,36 @@ import numpy as np
 
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.scatter import Scatter
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 from orthoscope.models.camera import Camera
 
-__all__ = ["CameraError", "predicted_error", "rms_difference", "seen_places"]
+__all__ = ["CameraError", "picked", "predicted_error", "rms_difference", "seen_places"]
 
-PLACES = 240  # corners that stand for all that were seen
-COLUMNS, ROWS = 28, 21  # of the map
-DIRECTIONS, STEPS = 48, 20  # in which the region is grown, and how finely
-GENEROUS = 2.0  # times the error over the seen part: where it is larger, the camera is not to be used
-NEGLIGIBLE = 0.05  # px: nor is a place given up whose error is below this
+# So many corners stand for all that were seen.
+PLACE_COUNT = 240
+# The map has so many columns.
+MAP_COLUMNS = 28
+# The map has so many rows.
+MAP_ROWS = 21
+# The region is grown in so many directions.
+DIRECTION_COUNT = 48
+# The region is grown in so many steps.
+REGION_STEPS = 20
+# Where the error is more than so many times that over the seen part, the camera is not to be used.
+GENEROUS_RATIO = 2.0
+# No place is given up whose error is below this, pixels.
+NEGLIGIBLE_PX = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class CameraError:
     """The predicted camera error, pixels per point.
 
-    Args:
+    Attributes:
         seen_px, frame_px: root mean square over the seen part and over the frame, of what is far away.
-        near_seen_px, near_frame_px: the same of things at the target's distance.
+        near_seen_px, near_frame_px: the same of things where the target was: over the seen part each corner
+            at its own distance, since a shift of the camera undoes less where distances differ; over the
+            frame at the typical one.
         model_px, alike_px, views_px, bias_px: over the seen part, far away, what makes it up: independent
             errors of corners with the priors' scatter; these with errors alike within a view; the jackknife
             over views with the priors' scatter; what a poorer model misses.
@@ -99,6 +110,7 @@ class _Variances:
         fitted: int,
         distance: float,
     ) -> None:
+        # rays may have lengths of their own: places along them, in units of the distance
         slopes = _settled(scatter, rays, fitted, distance)
         self.model, self.alike = _spread(slopes, scatter.model), _spread(slopes, scatter.alike)
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
@@ -126,29 +138,38 @@ class _Variances:
 
 
 def predicted_error(
-    scatter: Scatter, seen: Float[ndarray, "s 2"], *, distance: float, richest: Scatter | None = None
+    scatter: Scatter,
+    seen: Float[ndarray, "s 2"],
+    *,
+    distance: float | Float[ndarray, " s"],
+    richest: Scatter | None = None,
 ) -> CameraError:
     """The error that is to be expected of a camera.
 
     Args:
         scatter: of the camera.
         seen: pixels where corners were detected (`seen_places`).
-        distance: of the target in the typical view, metres.
+        distance: of the corner that was seen there, metres; one for all where that will do.
         richest: scatter of the richest model of the same photographs; None where it is this one.
     """
     camera = scatter.camera
     width, height = camera.image_size
     cells = _cells(width, height)
-    rays = camera.unproject(seen)
-    seen, rays = seen[np.isfinite(rays[:, 0])], rays[np.isfinite(rays[:, 0])]
+    rays, each = camera.unproject(seen), np.broadcast_to(np.asarray(distance, dtype=float), len(seen))
+    known = np.isfinite(rays[:, 0])
+    seen, rays, each = seen[known], rays[known], each[known]
+    typical = float(np.median(each))
     middle = np.median(seen, axis=0)
     ways = _ways(middle, width, height)
     places = np.concatenate([rays, camera.unproject(cells), camera.unproject(ways.reshape(-1, 2))])
     part_seen, part_frame = slice(len(seen)), slice(len(seen), len(seen) + len(cells))
-    far, near = (_Variances(scatter, richest, places, len(seen), to) for to in (np.inf, distance))
+    lengths = np.ones(len(places))
+    lengths[part_seen] = each / typical
+    far = _Variances(scatter, richest, places, len(seen), np.inf)
+    near = _Variances(scatter, richest, lengths[:, None] * places, len(seen), typical)
     seen_px, model_px, alike_px, views_px, bias_px = far.over(part_seen)
-    limit = max(GENEROUS * seen_px, NEGLIGIBLE)
-    along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(DIRECTIONS, STEPS)
+    limit = max(GENEROUS_RATIO * seen_px, NEGLIGIBLE_PX)
+    along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(DIRECTION_COUNT, REGION_STEPS)
     return CameraError(
         seen_px=seen_px,
         frame_px=far.over(part_frame)[0],
@@ -158,9 +179,9 @@ def predicted_error(
         alike_px=alike_px,
         views_px=views_px,
         bias_px=bias_px,
-        distance=distance,
-        far=np.sqrt(far.total[part_frame]).reshape(ROWS, COLUMNS),
-        near=np.sqrt(near.total[part_frame]).reshape(ROWS, COLUMNS),
+        distance=typical,
+        far=np.sqrt(far.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
+        near=np.sqrt(near.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
         limit_px=limit,
         region=_grown(middle, ways, along <= limit),
         without_px=np.sqrt(far.moved[part_seen].mean(0)),
@@ -184,8 +205,13 @@ def rms_difference(
 
 def seen_places(pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "s 2"]:
     """Detected corners, evenly picked, that stand for all; the same whatever the order of the views."""
-    ordered = pixels[np.lexsort(pixels.T)]
-    return ordered[np.unique(np.linspace(0, len(ordered) - 1, PLACES).round().astype(int))]
+    return pixels[picked(pixels)]
+
+
+def picked(pixels: Float[ndarray, "n 2"]) -> Int[ndarray, " s"]:
+    """Which of the detected corners `seen_places` picks."""
+    order = np.lexsort(pixels.T)
+    return order[np.unique(np.linspace(0, len(order) - 1, PLACE_COUNT).round().astype(int))]
 
 
 def _settled(
@@ -210,20 +236,20 @@ def _spread(slopes: Float[ndarray, "n 2 d"], covariance: Float[ndarray, "d d"]) 
 
 def _cells(width: int, height: int) -> Float[ndarray, "n 2"]:
     """Centres of the map's cells, row by row."""
-    x = (np.arange(COLUMNS) + 0.5) / COLUMNS * width - 0.5
-    y = (np.arange(ROWS) + 0.5) / ROWS * height - 0.5
+    x = (np.arange(MAP_COLUMNS) + 0.5) / MAP_COLUMNS * width - 0.5
+    y = (np.arange(MAP_ROWS) + 0.5) / MAP_ROWS * height - 0.5
     return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
 
 
 def _ways(middle: Float[ndarray, " 2"], width: int, height: int) -> Float[ndarray, "directions steps 2"]:
     """Pixels from the middle to the frame's border, in many directions."""
-    angle = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    angle = 2.0 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
     way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     low, high = np.array([-0.5, -0.5]), np.array([width - 0.5, height - 0.5])
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = np.where(way > 0, (high - middle) / way, (low - middle) / way)
     reach = np.where(np.abs(way) > 1e-12, reach, np.inf).min(1)
-    share = np.arange(1, STEPS + 1) / STEPS
+    share = np.arange(1, REGION_STEPS + 1) / REGION_STEPS
     return middle + reach[:, None, None] * share[:, None] * way[:, None]
 
 
@@ -231,7 +257,7 @@ def _grown(
     middle: Float[ndarray, " 2"], ways: ndarray, good: Bool[ndarray, "directions steps"]
 ) -> Float[ndarray, "n 2"]:
     """The polygon of the last place in each direction up to which all are good; the middle where none is."""
-    reached = np.where(good.all(1), STEPS, np.argmin(good, axis=1))
+    reached = np.where(good.all(1), REGION_STEPS, np.argmin(good, axis=1))
     edge = ways[np.arange(len(ways)), np.maximum(reached - 1, 0)]
     return np.where(reached[:, None] > 0, edge, middle)
 

@@ -22,7 +22,8 @@ __all__ = [
     "share_covered",
 ]
 
-COVERAGE_GRID = (8, 6)  # cells across and down by which the frame is said to be covered
+# The frame is said to be covered by so many cells across and down.
+COVERAGE_GRID = (8, 6)
 PLACES = (("at the top", "in the middle", "at the bottom"), ("left", "", "right"))
 
 

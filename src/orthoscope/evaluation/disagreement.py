@@ -39,26 +39,34 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["AGREED", "Disagreement", "Wishes", "changes_of", "disagreement", "spread_of", "wishes"]
 
-STEP = 0.01  # of the focal length or of the image's width: a change of K that counts as 1
-FAINT = 1e-3  # of the largest: an eigenvalue of T_j below it is no wish
-OWN = 0.3  # singular value of a pattern, C_j projected out: below it the pattern is one that K makes too
-# F2 above and p below: views do not agree. Four tests share the chance, and real boards flex in more ways
-# than the patterns of the null: with 1e-4 one clean real set in ten was blamed.
-LARGE, SURE = 3.0, 1e-6
+# A change of K that counts as 1 is this share of the focal length or of the image's width.
+STEP_SHARE = 0.01
+# An eigenvalue of T_j below this share of the largest is no wish.
+FAINT_SHARE = 1e-3
+# A pattern with a singular value below this, C_j projected out, is one that K makes too.
+LEAST_OWN_SINGULAR_VALUE = 0.3
+# Views do not agree when F2 is above this and p is below SURE_P_VALUE.
+LARGE_F2 = 3.0
+# Four tests share the chance, and real boards flex in more ways than the patterns of the null: with 1e-4 one
+# clean real set in ten was blamed.
+SURE_P_VALUE = 1e-6
+# With fewer views it cannot be told whether they agree.
 FEWEST_VIEWS = 5
 KINDS = {
     "zoom": [0],
     "centre": [1, 2],
     "shutter": [3, 4],
 }  # columns: scale, cx, cy, and the shears of a shutter
-SPREADING = 200  # rounds of expectation maximisation
-SAMPLE = 300  # pixels at which an image's movement is looked at
+# Expectation maximisation has so many rounds.
+SPREADING_ROUNDS = 200
+# An image's movement is looked at in so many pixels.
+SAMPLE_COUNT = 300
 
 
 class Wishes(NamedTuple):
     """What each of m views would have liked c changes of K to be.
 
-    Args:
+    Attributes:
         kappa: (m,c) the wish, in the changes' own steps; 0 where the view has none.
         told: (m,c,c) T_j over the noise and tau: the inverse of the wish's covariance.
         f2: F over max(1, tau).
@@ -75,7 +83,7 @@ class Wishes(NamedTuple):
     @property
     def certain(self) -> bool:
         """Whether the views surely differ."""
-        return self.f2 > LARGE and self.p_value < SURE
+        return self.f2 > LARGE_F2 and self.p_value < SURE_P_VALUE
 
     @property
     def spread(self) -> Float[ndarray, "c c"]:
@@ -87,7 +95,7 @@ class Wishes(NamedTuple):
 class Disagreement:
     """Whether photographs agree on one camera.
 
-    Args:
+    Attributes:
         f2, p_value: of the test; NaN where the views do not suffice for one.
         certain: whether they surely do not.
         kind: what changes most between them: `zoom`, `centre`, `shutter`; empty where they agree.
@@ -137,8 +145,8 @@ def disagreement(fit: Linearised, detections: Detections) -> Disagreement:
         certain=True,
         kind=_kind(fit, moves),
         by_px=_movement(fit, changes, spread, pixels),
-        focal=STEP * float(np.sqrt(spread[0, 0])),
-        centre_px=STEP * width * float(np.sqrt(spread[1, 1] + spread[2, 2])),
+        focal=STEP_SHARE * float(np.sqrt(spread[0, 0])),
+        centre_px=STEP_SHARE * width * float(np.sqrt(spread[1, 1] + spread[2, 2])),
         wishes=of_K,
     )
 
@@ -152,12 +160,12 @@ def changes_of(fit: Linearised, more: tuple[str, ...] = ()) -> tuple[tuple[str, 
     """
     K, width = fit.camera.intrinsics, fit.camera.image_size[0]
     parts = [name.split("=") for name in fit.names]
-    scale = {i: STEP * getattr(K, part[0]) for i, part in enumerate(parts) if part[0] in ("fx", "fy")}
+    scale = {i: STEP_SHARE * getattr(K, part[0]) for i, part in enumerate(parts) if part[0] in ("fx", "fy")}
     steps: dict[str, dict[int, float]] = {"scale": scale} if scale else {}
     for name in ("cx", "cy"):
         if [name] in parts:
-            steps[name] = {parts.index([name]): STEP * width}
-    steps |= {name: {parts.index([name]): STEP} for name in more if [name] in parts}
+            steps[name] = {parts.index([name]): STEP_SHARE * width}
+    steps |= {name: {parts.index([name]): STEP_SHARE} for name in more if [name] in parts}
     changes = np.zeros((fit.unknowns, len(steps)))
     for column, step in enumerate(steps.values()):
         changes[list(step), column] = list(step.values())
@@ -192,7 +200,7 @@ def _pseudo_inverse(told: Float[ndarray, "m c c"]) -> tuple[Float[ndarray, "m c 
     """T_j^+ and the ranks, faint directions left out; columns are scaled alike in all views first."""
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).max(0), 1e-300))
     values, vectors = np.linalg.eigh(told * scale * scale[:, None])
-    strong = values > FAINT * max(values.max(), 1e-300)
+    strong = values > FAINT_SHARE * max(values.max(), 1e-300)
     inverse = (
         vectors * np.where(strong, 1.0 / np.where(strong, values, 1.0), 0.0)[:, None]
     ) @ vectors.transpose(0, 2, 1)
@@ -211,7 +219,7 @@ def _alike(
     basis = np.linalg.qr(moves / np.maximum(np.sqrt((moves**2).sum(1, keepdims=True)), 1e-300))[0]
     rows = rows - basis @ (basis.transpose(0, 2, 1) @ rows)
     vectors, values, _ = np.linalg.svd(rows, full_matrices=False)
-    vectors = vectors * (values > OWN)[:, None]
+    vectors = vectors * (values > LEAST_OWN_SINGULAR_VALUE)[:, None]
     freedom = float((vectors * (vectors - hat_of(fit, vectors))).sum())
     energy = float(((vectors.transpose(0, 2, 1) @ fit.errors[..., None]) ** 2).sum())
     return energy / (fit.noise * max(freedom, 1e-9)), freedom
@@ -222,7 +230,7 @@ def spread_of(score: Float[ndarray, "m c"], told: Float[ndarray, "m c c"]) -> Fl
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).mean(0), 1e-300))
     heard, told = -score * scale, told * scale * scale[:, None]
     spread = np.eye(len(scale))
-    for _ in range(SPREADING):
+    for _ in range(SPREADING_ROUNDS):
         posterior = np.linalg.inv(np.linalg.inv(spread) + told)
         mean = (posterior @ heard[..., None])[..., 0]
         spread = (mean[:, :, None] * mean[:, None] + posterior).mean(0)
@@ -241,7 +249,7 @@ def _movement(fit: Linearised, changes: ndarray, spread: ndarray, pixels: Float[
 
 
 def _moved_squared(camera: Camera, names: tuple[str, ...], step: ndarray, pixels: ndarray) -> float:
-    sample = pixels[:: max(1, len(pixels) // SAMPLE)]
+    sample = pixels[:: max(1, len(pixels) // SAMPLE_COUNT)]
     difference = image_difference(camera, Parameters.of(names).moved(camera, step), sample)
     return float(np.nanmean((difference**2).sum(1)))
 

@@ -46,7 +46,7 @@ __all__ = ["Evaluation", "UnseenError", "ViewError", "evaluate", "evaluate_on", 
 class Evaluation:
     """What `evaluate` finds out about a calibration.
 
-    Args:
+    Attributes:
         calibration: that was evaluated.
         rms_px, median_px, largest_px: of |residual| over the corners that it was made from.
         held_out_rms_px: over all corners, each by a camera that did not use its photograph; NaN where there
@@ -113,8 +113,11 @@ class UnseenError:
 def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | None = None) -> UnseenError:
     """The error of a camera on other photographs: the camera stays fixed, the pose of each view is fitted.
 
-    shape: of the target, where it is known and these photographs show the same one. Raises InputError where
-    the photographs are of another size than the camera's, CalibrationError where no view can be used.
+    Args:
+        shape: of the target, where it is known and these photographs show the same one.
+    Raises:
+        InputError: the photographs are of another size than the camera's.
+        CalibrationError: no view can be used.
     """
     if tuple(detections.image_size) != tuple(camera.image_size):
         (width, height), (w, h) = detections.image_size, camera.image_size

@@ -6,12 +6,12 @@ quadratic is lower. Two questions, and either makes two groups of photographs:
 
 1. *Is it two values, or a spread?*  exp(-q_j / 2) is the likelihood of a view.  Two changes, each view with
    one of them, are compared with changes that are normally distributed (a lens that focuses anew for every
-   photograph): groups are named where two values are TWICE_AS_LIKELY.  A view whose likelihoods differ too
-   little to tell belongs to neither.
+   photograph): groups are named where the logarithm of their ratio is LEAST_LOG_RATIO.  A view whose
+   likelihoods differ too little to tell belongs to neither.
 2. *Do two cameras foresee the photographs far better?*  Groupings of the linear step are refined by a fit for
    each group, each view going to the camera that sees it with less error (by leave-one-out in its own group),
-   until nothing changes. Photographs are of two cameras where these foresee them with less than APART of the
-   error of one for all.
+   until nothing changes. Photographs are of two cameras where these foresee them with less than APART_SHARE
+   of the error of one for all.
 
 The first finds what is small beside the noise, the second what is too large to be linear.
 S. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28(2), 1982 (k-means, here on
@@ -38,23 +38,32 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Groups", "two_groups"]
 
-APART = 0.7  # of the error of one camera for all
-BEYOND_DOUBT = 0.5  # of it: with less, no other start is tried
-TWICE_AS_LIKELY = 2.5  # logarithm of the likelihood ratio: two values against a spread
-CERTAINLY = 0.95  # a view with less than this for either group is in none
-# of the squared residuals: what the linear step must explain of them before fits are worth their time
-SMALL = 0.3
-FEWEST = 4  # views of a group: with fewer, none can be left out
-STARTS = 60
-ROUNDS = 6  # of refinement
-SETTLING = 60  # rounds of k-means, and of the likelihoods
-REFINED = 4  # groupings
+# Two cameras leave less than this share of the error of one camera for all.
+APART_SHARE = 0.7
+# Where less than this share of one camera's error is left no other start is tried.
+BEYOND_DOUBT_SHARE = 0.5
+# The logarithm of the likelihood ratio, of two values against a spread, is at least this.
+LEAST_LOG_RATIO = 2.5
+# A view with less than this for either group is in none.
+CERTAIN_LIKELIHOOD = 0.95
+# The linear step must explain this share of the squared residuals before fits are worth their time.
+LEAST_EXPLAINED_SHARE = 0.3
+# A group has at least this many views: with fewer, none can be left out.
+FEWEST_VIEWS = 4
+# K-means starts from so many groupings that are drawn at random.
+RANDOM_STARTS = 60
+# A grouping is refined so many times.
+REFINING_ROUNDS = 6
+# K-means, and the likelihoods, have so many rounds.
+SETTLING_ROUNDS = 60
+# So many groupings are refined.
+REFINED_GROUPINGS = 4
 
 
 class Groups(NamedTuple):
     """Two groups of views.
 
-    Args:
+    Attributes:
         first, second: indices of the views, ascending; the larger group first.
         unsure: of views that may be in either.
     """
@@ -94,20 +103,20 @@ def two_groups(
         detections: of the fit.
         base: the formula under the free lens.
     """
-    if found.wishes is None or fit.views < 2 * FEWEST:
+    if found.wishes is None or fit.views < 2 * FEWEST_VIEWS:
         return None
     noise = fit.noise * max(1.0, found.wishes.tau)
     groupings = _groupings(_quadratics(fit, noise, ("k1",)))
     explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
     joint, best = float(np.nansum(whole.squares)), (np.inf, None)
-    for _, start in groupings[:REFINED] if explained > SMALL else ():
+    for _, start in groupings[:REFINED_GROUPINGS] if explained > LEAST_EXPLAINED_SHARE else ():
         refined = _refined(detections, start, base=base)
         if refined is not None and refined[0] < best[0]:
             best = refined
-        if np.sqrt(best[0] / joint) < BEYOND_DOUBT:
+        if np.sqrt(best[0] / joint) < BEYOND_DOUBT_SHARE:
             break
     squares, second = best
-    if second is not None and np.sqrt(squares / joint) < APART:
+    if second is not None and np.sqrt(squares / joint) < APART_SHARE:
         return _named(second, np.ones(len(second), dtype=bool))
     return None if found.kind == "shutter" else _two_values(_quadratics(fit, noise))
 
@@ -128,22 +137,24 @@ def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
     views = len(say.score)
     faint = 1e-9 * np.eye(say.score.shape[1]) * np.trace(say.told.mean(0))
     wishes = -np.linalg.solve(say.told + faint, say.score[..., None])[..., 0]
-    cuts = [[wish > cut for cut in np.sort(wish)[FEWEST - 1 : -FEWEST]] for wish in wishes.T]
+    cuts = [[wish > cut for cut in np.sort(wish)[FEWEST_VIEWS - 1 : -FEWEST_VIEWS]] for wish in wishes.T]
     rng = np.random.default_rng(0)
-    starts = [rng.random(views) < 0.5 for _ in range(STARTS)] + [
+    starts = [rng.random(views) < 0.5 for _ in range(RANDOM_STARTS)] + [
         start for of_wish in cuts for start in of_wish
     ]
     ends = [_clustered(say, start) for start in starts]
     ends += [min(of_wish, key=lambda second: _value(say, second)) for of_wish in cuts if of_wish]
     able = {
-        (second ^ second[0]).tobytes(): second for second in ends if FEWEST <= second.sum() <= views - FEWEST
+        (second ^ second[0]).tobytes(): second
+        for second in ends
+        if FEWEST_VIEWS <= second.sum() <= views - FEWEST_VIEWS
     }
     return sorted(((_value(say, second), second) for second in able.values()), key=lambda entry: entry[0])
 
 
 def _clustered(say: _Quadratics, second: Bool[ndarray, " m"]) -> Bool[ndarray, " m"]:
     """k-means on quadratics from a start."""
-    for _ in range(SETTLING):
+    for _ in range(SETTLING_ROUNDS):
         if not 1 <= second.sum() < len(second):
             break
         moved = say.at(say.lowest(second.astype(float))) < say.at(say.lowest((~second).astype(float)))
@@ -165,17 +176,17 @@ def _two_values(say: _Quadratics) -> Groups | None:
         return None
     share = np.stack([~groupings[0][1], groupings[0][1]]).astype(float)
     likely = np.zeros(share.shape[1])
-    for _ in range(SETTLING):
+    for _ in range(SETTLING_ROUNDS):
         weight = np.maximum(share.mean(1), 1e-6)
         each = np.stack(
             [np.log(w) - 0.5 * say.at(say.lowest(part)) for w, part in zip(weight, share, strict=True)]
         )
         likely = np.logaddexp(*each)
         share = np.exp(each - likely)
-    if likely.sum() - _likelihood_of_spread(say) < TWICE_AS_LIKELY:
+    if likely.sum() - _likelihood_of_spread(say) < LEAST_LOG_RATIO:
         return None
-    second, sure = share[1] > share[0], share.max(0) > CERTAINLY
-    few = min((sure & second).sum(), (sure & ~second).sum()) < FEWEST
+    second, sure = share[1] > share[0], share.max(0) > CERTAIN_LIKELIHOOD
+    few = min((sure & second).sum(), (sure & ~second).sum()) < FEWEST_VIEWS
     return None if few else _named(second, sure)
 
 
@@ -197,8 +208,8 @@ def _refined(
     """
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
-    for _ in range(ROUNDS):
-        if second.tobytes() in seen or not FEWEST <= second.sum() <= len(second) - FEWEST:
+    for _ in range(REFINING_ROUNDS):
+        if second.tobytes() in seen or not FEWEST_VIEWS <= second.sum() <= len(second) - FEWEST_VIEWS:
             break
         seen.add(second.tobytes())
         try:

@@ -10,7 +10,7 @@ from orthoscope.fitting.calibration import points_of
 from orthoscope.fitting.held_out import HeldOut
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import WIDEST, Camera, Intrinsics
+from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
@@ -52,8 +52,8 @@ def lateral_errors(
 ) -> tuple[ndarray, ndarray]:
     """Points as back-projected from the detected pixels and as the poses place them, for NCE.
 
-    Corners that no straight image would hold (WIDEST), or whose pixel no ray reaches, are left out: towards
-    90 degrees a lateral error grows without end.
+    Corners that no straight image would hold (WIDEST_ANGLE), or whose pixel no ray reaches, are left out:
+    towards 90 degrees a lateral error grows without end.
 
     Args:
         camera: gives the rays.
@@ -71,8 +71,8 @@ def lateral_errors(
         ]
     )
     rays = camera.unproject(np.concatenate([view.pixels for view in detections.views]))
-    usable = (rays[:, 2] > np.cos(WIDEST)) & (
-        observed[:, 2] > np.cos(WIDEST) * np.sqrt((observed**2).sum(-1))
+    usable = (rays[:, 2] > np.cos(WIDEST_ANGLE)) & (
+        observed[:, 2] > np.cos(WIDEST_ANGLE) * np.sqrt((observed**2).sum(-1))
     )
     rays, observed = rays[usable], observed[usable]
     return rays * (observed[:, 2] / rays[:, 2])[:, None], observed

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orthoscope.evaluation.camera_error import CameraError, predicted_error, rms_difference, seen_places
+from orthoscope.evaluation.camera_error import CameraError, picked, predicted_error, rms_difference
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.leave_one_out import LeaveOneOut
@@ -21,7 +21,8 @@ from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["ReferenceFit", "reference_fit"]
 
-AS_GOOD = 0.2  # of the error: a camera that is nearer to a fit of which all is known is that fit's
+# A camera that is nearer to a fit of which all is known than this share of the error is that fit's.
+AS_GOOD_SHARE = 0.2
 # Methods whose own fit leaves views out: where it cannot, nothing is known of their camera.
 ONE_FIT = ("decoupled", "fccm")
 
@@ -30,7 +31,7 @@ ONE_FIT = ("decoupled", "fccm")
 class ReferenceFit:
     """The richest fit and what it says.
 
-    Args:
+    Attributes:
         known: it, linearised.
         left_out: each view left out of it.
         base: the formula under its free lens.
@@ -58,14 +59,22 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
     base, known, left_out, of_richest = fits.richest
     scatter = fits.own.scatter if fits.own else of_richest
     richest = None if scatter is of_richest else of_richest
-    detections = calibration.detections
-    seen = seen_places(np.concatenate([view.pixels for view in detections.views]))
-    distance = float(np.median([np.linalg.norm(pose.translation) for pose in calibration.camera_from_target]))
+    pixels = np.concatenate([view.pixels for view in calibration.detections.views])
+    some = picked(pixels)
+    seen, distance = pixels[some], _distances(calibration)[some]
     error = predicted_error(scatter, seen, distance=distance, richest=richest)
     apart = rms_difference(calibration.camera, scatter.camera, seen)
-    if apart > AS_GOOD * error.seen_px:
+    if apart > AS_GOOD_SHARE * error.seen_px:
         # Not the minimum of a fit whose scatter is known: what is apart is its bias.
-        error = replace(error, seen_px=float(np.hypot(error.seen_px, apart)), bias_px=apart)
+        near_px, far_px = (float(np.hypot(px, apart)) for px in (error.near_seen_px, error.seen_px))
+        error = replace(error, seen_px=far_px, near_seen_px=near_px, bias_px=apart)
     without = (fits.own.left_out**2).sum(1) if fits.own else left_out.squares
     within = np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
     return ReferenceFit(known, left_out, base, error, without, within)
+
+
+def _distances(calibration: Calibration) -> Float[ndarray, " n"]:
+    """Of every detected corner from the camera, metres, view after view."""
+    points = calibration.detections.target.points
+    pairs = zip(calibration.camera_from_target, calibration.detections.views, strict=True)
+    return np.concatenate([np.linalg.norm(pose.apply(points[view.ids]), axis=1) for pose, view in pairs])

@@ -22,13 +22,14 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["SameBoard", "same_board"]
 
-SURELY = 2.0  # standard errors, over views
+# A gain of more than so many standard errors over views is hardly chance.
+SURE_ERRORS = 2.0
 
 
 class SameBoard(NamedTuple):
     """Whether other photographs show the board that a camera was calibrated with.
 
-    Args:
+    Attributes:
         same: whether its learnt shape fits them better than no shape.
         sure: whether views agree on that beyond chance.
         learnt_px, said_px: rms per point with the learnt shape, and with corners where they are said to be.
@@ -56,7 +57,7 @@ def same_board(camera: Camera, shape: TargetShape, detections: Detections) -> Sa
     error = float(np.sqrt(len(gained)) * gained.std(ddof=1)) if len(gained) > 1 else np.inf
     return SameBoard(
         same=bool(gained.sum() > 0.0),
-        sure=bool(abs(gained.sum()) > SURELY * error),
+        sure=bool(abs(gained.sum()) > SURE_ERRORS * error),
         learnt_px=float(np.sqrt(learnt.sum() / corners)),
         said_px=float(np.sqrt(said.sum() / corners)),
     )

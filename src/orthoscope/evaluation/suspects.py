@@ -17,15 +17,22 @@ from orthoscope.evaluation.coverage import place_of
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.scatter import patterns_over_views
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.numbers import rough_pixels
 from orthoscope.targets.detections import Detections
 
 __all__ = ["ViewError", "precious_among", "suspects_among"]
 
-SUSPECT = 2.5  # times the typical photograph's rms
-NOTABLE_PX = 0.3  # but not where it is small in itself
-SMOOTH = 0.6  # of the squared residuals: what patterns of low order explain of them where a board was bent
-ALONE = 2.0  # times what the photograph's own residual is: its error where it is left out
-GAINED = 1.5  # times the typical left-out error
+# A photograph is a suspect with more than this many times the typical photograph's rms.
+SUSPECT_FACTOR = 2.5
+# An rms that is smaller in itself, pixels, makes no suspect.
+NOTABLE_PX = 0.3
+# Where a board was bent patterns of low order explain more than this share of the squared residuals.
+SMOOTH_SHARE = 0.6
+# Left out, a photograph that stands alone has more than this many times its own residual.
+ALONE_FACTOR = 2.0
+# A photograph that stands alone also has more than this many times the typical left-out error.
+GAINED_FACTOR = 1.5
+# With fewer views none of them can be told from the others.
 FEWEST_VIEWS = 5
 
 
@@ -33,7 +40,7 @@ FEWEST_VIEWS = 5
 class ViewError:
     """One photograph's share.
 
-    Args:
+    Attributes:
         image: its name.
         corners: that were used.
         rms_px: per point, in the calibration.
@@ -59,7 +66,7 @@ def suspects_among(
     if len(views) < FEWEST_VIEWS:
         return ()
     typical = float(np.median(errors))
-    odd = np.flatnonzero(errors > max(SUSPECT * typical, NOTABLE_PX))
+    odd = np.flatnonzero(errors > max(SUSPECT_FACTOR * typical, NOTABLE_PX))
     if not len(odd):
         return ()
     smooth = _smooth_share(known, points) if known else np.zeros(len(views))
@@ -67,10 +74,12 @@ def suspects_among(
 
 
 def _wrong(error: float, typical: float, smooth: float) -> str:
-    figures = f"corners are off by {error:.2g} px, in a typical photograph by {typical:.2g}"
+    figures = (
+        f"corners are off by {rough_pixels(error)} px, in a typical photograph by {rough_pixels(typical)}"
+    )
     why = (
         "the target was bent another way"
-        if smooth > SMOOTH
+        if smooth > SMOOTH_SHARE
         else "it may be blurred, or the target or the camera moved"
     )
     return f"{figures}: {why}"
@@ -96,7 +105,7 @@ def precious_among(
         return ()
     own, foreseen = np.sqrt(within / corners), np.sqrt(without / corners)
     typical = float(np.nanmedian(foreseen))
-    alone = np.isnan(foreseen) | ((foreseen > ALONE * own) & (foreseen > GAINED * typical))
+    alone = np.isnan(foreseen) | ((foreseen > ALONE_FACTOR * own) & (foreseen > GAINED_FACTOR * typical))
     return tuple(
         (view.image, place_of(view.pixels, detections.image_size))
         for view, is_alone in zip(detections.views, alone, strict=True)

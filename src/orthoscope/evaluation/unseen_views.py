@@ -24,13 +24,14 @@ from orthoscope.methods import METHODS
 
 __all__ = ["USUAL_FOLDS", "UnseenViews", "in_folds", "in_turn"]
 
-USUAL_FOLDS = 5  # of a method that leaves no view out by itself
+# A method that leaves no view out by itself is called again without each of so many parts.
+USUAL_FOLDS = 5
 
 
 class UnseenViews(NamedTuple):
     """What was found.
 
-    Args:
+    Attributes:
         residuals: (n,2) of each view, predicted minus detected, pixels; NaN where nothing foresees them.
         rms_px, error_px: of all, per point, and its standard error over views; NaN where there are none.
         nce: of all, NaN where there are none.

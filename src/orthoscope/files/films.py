@@ -14,15 +14,20 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from orthoscope.files.sensor_frames import open_film
 from orthoscope.geometry.arrays import InputError, ndarray
 
 __all__ = ["FILMS", "Frame", "frames_of"]
 
 FILMS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".wmv")
-MOST = 60  # frames that are kept
-STRETCH = 4  # frames of the first stretches
-SMALL = (40, 30)  # px, of the copies that are compared: so small that blur does not show
-DIFFERS = 2.0  # grey levels, mean over a small copy
+# At most so many frames are kept.
+MOST_FRAMES = 60
+# The first stretches have so many frames.
+STRETCH_FRAMES = 4
+# Copies of this size, pixels, are compared: so small that blur does not show.
+COPY_SIZE = (40, 30)
+# Two frames differ by at least so many grey levels, mean over a small copy.
+LEAST_DIFFERENCE = 2.0
 
 
 class Frame(NamedTuple):
@@ -39,7 +44,7 @@ class _Kept(NamedTuple):
     stretch: int
 
 
-def frames_of(path: Path, *, most: int = MOST) -> list[Frame]:
+def frames_of(path: Path, *, most: int = MOST_FRAMES) -> list[Frame]:
     """The frames of a film that are worth looking at, in order.
 
     Args:
@@ -48,11 +53,11 @@ def frames_of(path: Path, *, most: int = MOST) -> list[Frame]:
     Raises:
         InputError: it cannot be read as a film.
     """
-    film = cv2.VideoCapture(str(path))
+    film = open_film(path)
     rate = film.get(cv2.CAP_PROP_FPS)
     rate = rate if np.isfinite(rate) and 0.1 < rate < 10_000 else 30.0
     kept: list[_Kept] = []
-    length, number = STRETCH, 0
+    length, number = STRETCH_FRAMES, 0
     while True:
         more, picture = film.read()
         if not more:
@@ -72,13 +77,13 @@ def _with(kept: list[_Kept], picture: ndarray, seconds: float, stretch: int) -> 
     stretch.
     """
     grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
-    copy = cv2.resize(grey, (16 * SMALL[0], 16 * SMALL[1]), interpolation=cv2.INTER_AREA)
+    copy = cv2.resize(grey, (16 * COPY_SIZE[0], 16 * COPY_SIZE[1]), interpolation=cv2.INTER_AREA)
     sharpness = float((cv2.Laplacian(copy, cv2.CV_32F) ** 2).mean())
-    small = cv2.resize(copy, SMALL, interpolation=cv2.INTER_AREA).astype(np.int16)
+    small = cv2.resize(copy, COPY_SIZE, interpolation=cv2.INTER_AREA).astype(np.int16)
     new = _Kept(Frame(seconds, grey), sharpness, small, stretch)
     same = kept and kept[-1].stretch == stretch
     before = kept[:-1] if same else kept
-    if before and np.abs(before[-1].small - small).mean() < DIFFERS:
+    if before and np.abs(before[-1].small - small).mean() < LEAST_DIFFERENCE:
         return kept
     if same and kept[-1].sharpness >= sharpness:
         return kept

@@ -8,8 +8,14 @@ import struct
 
 __all__ = ["size_in_header", "without_turning"]
 
-START_OF_FRAME = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})  # markers of a JPEG that hold its size
-TIFF_WIDTH, TIFF_HEIGHT, TIFF_ORIENTATION = 256, 257, 274  # tags
+# These markers of a JPEG hold its size.
+START_OF_FRAME_MARKERS = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})
+# This tag holds a picture's width.
+TIFF_WIDTH = 256
+# This tag holds a picture's height.
+TIFF_HEIGHT = 257
+# This tag says which side of a picture is up.
+TIFF_ORIENTATION = 274
 # How a TIFF begins, also one beyond 4 GB: byte order, and how a place, a count of tags and a tag are written.
 TIFF_FORMS = {
     b"II*\0": ("<", "I", "H", "HHI4x"),
@@ -17,7 +23,8 @@ TIFF_FORMS = {
     b"II+\0": ("<", "Q", "Q", "HHQ8x"),
     b"MM\0+": (">", "Q", "Q", "HHQ8x"),
 }
-SHORT = 3  # the kind of a tag's value that has two bytes
+# A tag's value of this kind has two bytes.
+SHORT_KIND = 3
 
 
 def size_in_header(content: bytes) -> tuple[int, int] | None:
@@ -43,7 +50,7 @@ def _of_jpeg(content: bytes) -> tuple[int, int] | None:
     place = 2
     while place + 9 < len(content) and content[place] == 0xFF:
         marker = content[place + 1]
-        if marker in START_OF_FRAME:
+        if marker in START_OF_FRAME_MARKERS:
             height, width = struct.unpack(">HH", content[place + 5 : place + 9])
             return width, height
         place += 2 + struct.unpack(">H", content[place + 2 : place + 4])[0] if marker != 0xFF else 1
@@ -84,7 +91,7 @@ def without_turning(content: bytes) -> bytes:
             first = table + struct.calcsize(order + count_form)
             for entry in range(first, min(first + count * size, len(content) - size + 1), size):
                 if struct.unpack_from(order + "H", content, entry)[0] == TIFF_ORIENTATION:
-                    value = struct.pack(order + tag_form[:3] + "H", TIFF_ORIENTATION, SHORT, 1, 1)
+                    value = struct.pack(order + tag_form[:3] + "H", TIFF_ORIENTATION, SHORT_KIND, 1, 1)
                     mended[entry : entry + size] = value.ljust(size, b"\0")
             (table,) = struct.unpack_from(order + place_form, content, first + count * size)
     except (struct.error, OverflowError):

@@ -41,11 +41,18 @@ __all__ = [
 ]
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".gif")
-PAGED = (".tif", ".tiff", ".webp", ".gif")  # may hold several pictures
-MOST_MEGAPIXELS = 500.0  # a file that says it holds more is hardly a photograph
-STRETCHED = (0.005, 0.995)  # quantiles
-SAMPLED = 200_000  # pixels that the quantiles are taken from
-JPEG, PNG = b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"  # how they begin
+# Files with these suffixes may hold several pictures.
+PAGED_SUFFIXES = (".tif", ".tiff", ".webp", ".gif")
+# A file that says it holds more is hardly a photograph.
+MOST_MEGAPIXELS = 500.0
+# Grey levels between these quantiles are stretched to the whole range.
+STRETCHED_QUANTILES = (0.005, 0.995)
+# The quantiles are taken from about so many pixels.
+SAMPLED_PIXELS = 200_000
+# A JPEG begins with these bytes.
+JPEG_START = b"\xff\xd8\xff"
+# A PNG begins with these bytes.
+PNG_START = b"\x89PNG\r\n\x1a\n"
 MARKER = re.compile(
     rb"\xff[^\x00\xd0-\xd7\xff]"
 )  # of a JPEG's segment; FF 00 and restarts are part of the coded picture
@@ -135,7 +142,7 @@ def read_image(
 
 def pages_in(path: Path) -> int:
     """How many pictures a file holds; 1 for kinds that hold one, and where it cannot be told."""
-    if path.suffix.lower() not in PAGED:
+    if path.suffix.lower() not in PAGED_SUFFIXES:
         return 1
     try:
         content = _content(path, MOST_MEGAPIXELS)
@@ -161,7 +168,7 @@ def to_grey(image: ndarray) -> ndarray:
     finite = values[np.isfinite(values)]
     if not len(finite):
         return np.zeros(image.shape, dtype=np.uint8)
-    low, high = np.quantile(finite[:: max(1, len(finite) // SAMPLED)], STRETCHED)
+    low, high = np.quantile(finite[:: max(1, len(finite) // SAMPLED_PIXELS)], STRETCHED_QUANTILES)
     spare = 0.1 * (high - low)
     low, high = low - spare, max(high + spare, low + 1e-12)
     stretched = np.nan_to_num(values, nan=low, posinf=high, neginf=low)
@@ -188,7 +195,8 @@ def _content(path: Path, most_megapixels: float) -> bytes:
 def checked_whole(content: bytes, path: Path_) -> bytes:
     """The bytes of a picture's file.
 
-    Raises InputError where there are none or they are cut off.
+    Raises:
+        InputError: there are none or they are cut off.
     """
     if not content:
         raise InputError(f"{path} is empty; expected a photograph. Copy it again or leave it out.")
@@ -204,7 +212,8 @@ def write_image(path: Path_, image: ndarray) -> None:
     """Writes a picture, uint8 (h,w) or (h,w,3), in the format that its name ends in; as a whole or not at
     all.
 
-    Raises InputError where the format is not known or the place cannot be written.
+    Raises:
+        InputError: the format is not known or the place cannot be written.
     """
     suffix = Path(path).suffix.lower()
     options = [cv2.IMWRITE_JPEG_QUALITY, 95] if suffix in (".jpg", ".jpeg") else []
@@ -264,9 +273,9 @@ def _natural(path: Path) -> list[tuple[int, int, str]]:
 
 def _is_whole(content: bytes) -> bool:
     """Whether a JPEG or a PNG has its end; other formats are left to their decoder, which notices."""
-    if content.startswith(JPEG):
+    if content.startswith(JPEG_START):
         return b"\xd9" in _jpeg_segments(content)
-    if content.startswith(PNG):
+    if content.startswith(PNG_START):
         return b"IEND" in _png_chunks(content)
     return True
 
@@ -285,7 +294,7 @@ def _jpeg_segments(content: bytes) -> Iterator[bytes]:
 
 def _png_chunks(content: bytes) -> Iterator[bytes]:
     """The names of a PNG's chunks that are there whole."""
-    place = len(PNG)
+    place = len(PNG_START)
     while (end := place + 12 + int.from_bytes(content[place : place + 4], "big")) <= len(content):
         yield content[place + 4 : place + 8]
         place = end

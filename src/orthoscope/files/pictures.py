@@ -27,7 +27,7 @@ Given = str | PathLike[str] | ndarray | Iterable[str | PathLike[str] | ndarray] 
 class Picture:
     """One picture, in memory or still in its file.
 
-    Args:
+    Attributes:
         name: what its view will be called.
         source: the file, or the picture itself, (h,w) or (h,w,3).
         page: of the file, from 0.

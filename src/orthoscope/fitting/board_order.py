@@ -32,19 +32,25 @@ from orthoscope.targets.target import Target
 
 __all__ = ["Turn", "in_one_order", "listed_as_known", "turns_of"]
 
-FEWEST = 3  # views: of two, either may be the one that is turned
-LIKELY = 1e-3  # of the target's size: the standard deviation of a smooth shape's coefficients
-SURE = 10.0  # times the noise's variance, for each view that is turned: chance gives no such gain
-STARTS = 24  # views, of those that tell most, that are taken for the right one in turn
-ROUNDS = 20
-SAME = 1e-6  # of the target's size: points nearer than this are one
+# At least so many views are needed: of two, either may be the one that is turned.
+FEWEST_VIEWS = 3
+# A smooth shape's coefficients have a standard deviation of this share of the target's size.
+LIKELY_SHARE = 1e-3
+# Chance gives no gain of this many times the noise's variance for each view that is turned.
+SURE_GAIN = 10.0
+# So many views, of those that tell most, are taken for the right one in turn.
+START_VIEWS = 24
+# The turns are improved in at most so many rounds.
+ROUND_LIMIT = 20
+# Points nearer than this share of the target's size are one.
+SAME_SHARE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Turn:
     """One way in which a target is its own image.
 
-    Args:
+    Attributes:
         rotation: (3,3) about the middle of its points.
         corners: (p,) which corner each one comes to lie on.
     """
@@ -71,7 +77,9 @@ def turns_of(target: Target) -> list[Turn]:
 
 def _fits(turn: Turn, points: Float[ndarray, "p 3"]) -> bool:
     """Whether the turn brings every point to where another is."""
-    return bool(np.abs(points @ turn.rotation.T - points[turn.corners]).max() < SAME * np.ptp(points[:, :2]))
+    return bool(
+        np.abs(points @ turn.rotation.T - points[turn.corners]).max() < SAME_SHARE * np.ptp(points[:, :2])
+    )
 
 
 def in_one_order(flat: Calibration) -> Calibration:
@@ -79,7 +87,7 @@ def in_one_order(flat: Calibration) -> Calibration:
     poses turn with them.
     """
     turns = turns_of(flat.detections.target)
-    if len(turns) < 2 or len(flat.detections.views) < FEWEST or flat.camera.lens_frame is not None:
+    if len(turns) < 2 or len(flat.detections.views) < FEWEST_VIEWS or flat.camera.lens_frame is not None:
         return flat
     chosen = _chosen(_Sums.of(flat, turns))
     if not chosen.any():
@@ -168,7 +176,7 @@ class _Sums:
         freedom = 2 * observations.corners - 6 * m - k
         square = float((y**2).sum())
         size = float(np.ptp(points[:, :2], axis=0).max())
-        precision = square / max(freedom, 1) / (LIKELY * size) ** 2
+        precision = square / max(freedom, 1) / (LIKELY_SHARE * size) ** 2
         prior = np.diag(np.concatenate([1e-9 * np.diag(gram[:, 0].sum(0))[:k], np.full(3 * r, precision)]))
         return cls(gram, right, prior, square, freedom, k, _after(turns))
 
@@ -211,10 +219,10 @@ def _chosen(sums: _Sums) -> Int[ndarray, " m"]:
     none = np.zeros(m, dtype=np.int64)
     before, _ = sums.total(none)
     best, cost = none, before
-    for first in sums.telling(STARTS):
+    for first in sums.telling(START_VIEWS):
         tried = none.copy()
         told = sums.shape(tried, np.array([first]))
-        for _ in range(ROUNDS):
+        for _ in range(ROUND_LIMIT):
             before_this, tried = tried, sums.costs(told).argmin(1)
             if (tried == before_this).all():
                 break
@@ -224,7 +232,9 @@ def _chosen(sums: _Sums) -> Int[ndarray, " m"]:
             best, cost = tried, total
     best = _least_turned(best, sums.after)
     noise = max(sums.square + cost, 1e-12 * sums.square) / max(sums.freedom, 1)
-    needed = SURE * noise * sums.likeness(best, sums.total(best)[1], noise) * max(int((best > 0).sum()), 1)
+    needed = (
+        SURE_GAIN * noise * sums.likeness(best, sums.total(best)[1], noise) * max(int((best > 0).sum()), 1)
+    )
     return best if before - cost > needed else none
 
 

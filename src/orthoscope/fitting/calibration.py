@@ -7,7 +7,7 @@ own.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ __all__ = ["Calibration", "Candidate", "Uncertainty", "Variances", "points_of", 
 class Uncertainty:
     """What the data leave open about the camera.
 
-    Args:
+    Attributes:
         names: the parameters that were estimated, `fx`, `cx`, `k1`...; a parameter tied to another bears both
             names, `fx=fy`.
         covariance: (k,k), in the parameters' own units.
@@ -66,7 +66,7 @@ class Uncertainty:
 class Variances(NamedTuple):
     """How large a fit with priors found noise and displacements to be (methods/decoupled/evidence.py).
 
-    Args:
+    Attributes:
         noise: px^2 of a coordinate.
         surface: metres^2, of the target's smooth displacement along its plane and across it.
         singles: metres^2, of corners by themselves along each axis.
@@ -86,7 +86,7 @@ class Variances(NamedTuple):
 class Candidate(NamedTuple):
     """What a method tried, and how well it foresees photographs that it has not seen.
 
-    Args:
+    Attributes:
         target: the kind of the target's shape.
         lens: a formula, or `free`.
         held_out_px: rms over all corners, each view foreseen by the others, pixels per point; NaN where no
@@ -112,15 +112,20 @@ class Candidate(NamedTuple):
 class Calibration:
     """A camera with the evidence for it.
 
-    camera_from_target: one pose for each of `detections.views`, in their order. method, settings: what was
-    called, so that it can be called again. status: how the solver ended, a sentence. steps: how many it took.
-    assumptions: what was taken for granted because the data could not tell, each a sentence. target_shape:
-    where the target's corners were found to be; flat where nothing is said. parameters: how many of camera
-    and shape the data determined, a real number where priors shared in it. candidates: what else was tried,
-    simplest first. free_camera: with the lens that no formula limits, where the camera's is a formula.
-    variances: that a fit with priors found and ended with. kept: the fits that its method made, for
-    evaluation in the same process; neither saved nor sent. Raises InputError where poses and views, or the
-    shape and the target, do not match in number.
+    Attributes:
+        camera_from_target: one pose for each of `detections.views`, in their order.
+        method, settings: what was called, so that it can be called again.
+        status: how the solver ended, a sentence.
+        steps: how many it took.
+        assumptions: what was taken for granted because the data could not tell, each a sentence.
+        target_shape: where the target's corners were found to be; flat where nothing is said.
+        parameters: how many of camera and shape the data determined, a real number where priors shared in it.
+        candidates: what else was tried, simplest first.
+        free_camera: with the lens that no formula limits, where the camera's is a formula.
+        variances: that a fit with priors found and ended with.
+        kept: the fits that its method made, for evaluation in the same process; neither saved nor sent.
+    Raises:
+        InputError: poses and views, or the shape and the target, do not match in number.
     """
 
     camera: Camera
@@ -174,6 +179,21 @@ class Calibration:
         domain has ended.
         """
         return residuals_of(self.camera, self.camera_from_target, self.detections, shape=self.target_shape)
+
+    def corrected(self) -> Detections:
+        """The detections with every corner where the pin-hole alone sees it (the paper's q_p).
+
+        Detections of a straight photograph are detections like any: a calibration of these finds K and no
+        lens. Corners beside or behind the camera have no such place and are left out.
+        """
+        K, points = self.camera.intrinsics, self.target_points
+        views = []
+        for pose, view in zip(self.camera_from_target, self.detections.views, strict=True):
+            x, y, z = pose.apply(points[view.ids]).T
+            front = z > 0
+            pixels = np.stack(K.pixel(x[front] / z[front], y[front] / z[front]), axis=-1)
+            views.append(replace(view, ids=view.ids[front], pixels=pixels))
+        return replace(self.detections, views=tuple(views))
 
     @property
     def target_points(self) -> Float[ndarray, "m 3"]:

@@ -28,16 +28,20 @@ from orthoscope.targets.detections import Detections, View
 
 __all__ = ["at_disc_centres", "disc_offsets", "has_outlines"]
 
-RIM_POINTS = 48  # as many as the detector looks for on an outline
+# A disc's outline has as many points here as the detector looks for.
+RIM_POINTS = 48
 
 
 def has_outlines(detections: Detections) -> bool:
     """Whether the pixels are centres of discs' outlines that nobody has corrected."""
-    return detections.target.disc_radius > 0 and not detections.disc_centres
+    return bool(detections.target.disc_radii.any()) and not detections.disc_centres
 
 
 def disc_offsets(
-    camera: Camera, camera_from_target: Pose, points: Float[ndarray, "n 3"], radius: float
+    camera: Camera,
+    camera_from_target: Pose,
+    points: Float[ndarray, "n 3"],
+    radius: float | Float[ndarray, " n"],
 ) -> Float[ndarray, "n 2"]:
     """From where each disc's centre is seen to the centre of its outline, pixels; 0 where it has none.
 
@@ -45,11 +49,12 @@ def disc_offsets(
         camera: which sees them.
         camera_from_target: where the target stands.
         points: the discs' centres, metres, target frame.
-        radius: of the discs, metres.
+        radius: of the discs, metres; of all or of each.
     """
     angle = 2.0 * np.pi * np.arange(RIM_POINTS) / RIM_POINTS
-    rim = radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(RIM_POINTS)], axis=1)
-    around = camera_from_target.apply((points[:, None] + rim).reshape(-1, 3))
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(RIM_POINTS)], axis=1)
+    rims = points[:, None] + np.broadcast_to(radius, len(points))[:, None, None] * rim
+    around = camera_from_target.apply(rims.reshape(-1, 3))
     outlines = camera.project(around, beyond=True).reshape(-1, RIM_POINTS, 2)
     centres = camera.project(camera_from_target.apply(points), beyond=True)
     return np.nan_to_num(fit_ellipses(outlines).centres - centres)
@@ -76,12 +81,15 @@ def at_disc_centres(
     """
     if not has_outlines(detections):
         return detections
-    points, poses = points_of(detections.target, shape), dict(zip(images, camera_from_target, strict=True))
+    every, radii = points_of(detections.target, shape), detections.target.disc_radii
+    poses = dict(zip(images, camera_from_target, strict=True))
     views = []
     for view in detections.views:
-        if view.image in poses and len(view.ids):
+        if view.image in poses and len(view.ids) and radii[view.ids].any():
             pose = poses[view.image]
-            offsets = disc_offsets(camera, pose, points, detections.target.disc_radius)
+            mine = detections.target.parts[int(detections.member_of(view.ids)[0])]
+            points = every[mine]
+            offsets = disc_offsets(camera, pose, points, radii[mine])
             outlines = camera.project(pose.apply(points), beyond=True) + offsets
             apart = np.linalg.norm(view.pixels[:, None] - outlines, axis=-1)
             disc = np.where(np.isfinite(apart), apart, np.inf).argmin(1)

@@ -20,7 +20,7 @@ __all__ = ["Fits", "OwnFit", "RichestFit"]
 class OwnFit(NamedTuple):
     """The calibration's own model.
 
-    Args:
+    Attributes:
         left_out: (m,2p) residuals of each view by the fit without it, as in `LeaveOneOut`.
         scatter: of its camera.
     """
@@ -32,7 +32,7 @@ class OwnFit(NamedTuple):
 class RichestFit(NamedTuple):
     """Every corner free and a free lens.
 
-    Args:
+    Attributes:
         base: the formula under the free lens.
         known: the fit, linearised.
         left_out: each view left out of it.

@@ -25,7 +25,8 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["FEWEST_VIEWS", "HeldOut", "folds_of_views", "held_out", "rms_and_error"]
 
-FEWEST_VIEWS = 4  # with fewer, a fold would leave a calibration that rests on assumptions
+# With fewer views a fold would leave a calibration that rests on assumptions.
+FEWEST_VIEWS = 4
 
 Refit = Callable[[Detections], Calibration]
 
@@ -65,8 +66,9 @@ class HeldOut:
 def rms_and_error(squares: Float[ndarray, " m"], corners: Float[ndarray, " m"]) -> tuple[float, float]:
     """Root mean square per point over views, and its standard error, views taken as independent draws.
 
-    squares: of each view the sum of |residual|^2, NaN where there is none; such views take no part. corners:
-    of each view.
+    Args:
+        squares: of each view the sum of |residual|^2, NaN where there is none; such views take no part.
+        corners: of each view.
     """
     known = np.isfinite(squares)
     squares, corners = squares[known], corners[known]
@@ -83,7 +85,8 @@ def rms_and_error(squares: Float[ndarray, " m"], corners: Float[ndarray, " m"]) 
 def folds_of_views(views: int, folds: int, *, seed: int = 0) -> list[ndarray]:
     """Indices of the views of each fold: a permutation of default_rng(seed), cut into nearly equal parts.
 
-    Raises InputError for fewer than two folds.
+    Raises:
+        InputError: fewer than two folds.
     """
     if folds < 2:
         raise InputError(
@@ -107,9 +110,14 @@ def held_out(
 ) -> HeldOut:
     """Held-out residuals of `refit` (a method with its settings) on these detections.
 
-    executor: where the folds run; by default here, one after the other. progress: called with (folds done,
-    folds). A fold whose training views cannot tell the camera leaves its views without residuals (NaN); so do
-    fewer than four views. Raises InputError for fewer than two folds.
+    A fold whose training views cannot tell the camera leaves its views without residuals (NaN); so do fewer
+    than four views.
+
+    Args:
+        executor: where the folds run; by default here, one after the other.
+        progress: called with (folds done, folds).
+    Raises:
+        InputError: fewer than two folds.
     """
     views = len(detections.views)
     cameras: list[Camera | None] = [None] * views

@@ -22,9 +22,12 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["check_enough", "check_known", "told"]
 
-NOISE = 0.1  # px: corners are never taken to be better than this when asking what the views can tell
-VAGUE = 0.1  # a scale less certain than this share of itself is not known
-PARALLEL = np.deg2rad(10.0)  # targets that are turned against the first by less than this count as parallel
+# Corners are never taken to be better than this, pixels, when asking what the views can tell.
+LEAST_NOISE_PX = 0.1
+# A scale less certain than this share of itself is not known.
+VAGUE_SHARE = 0.1
+# Targets that are turned against the first by less than this, radians, count as parallel.
+PARALLEL_ANGLE = np.deg2rad(10.0)
 
 
 def check_enough(used: Detections, free: Sequence[str]) -> None:
@@ -61,9 +64,9 @@ def check_known(
     camera, poses = solution.unknowns
     variance = solution.cost / max(2 * used.corners - len(free) - 6 * len(used.views), 1)
     deviation = _relative_deviation_of_scale(camera, free, covariance) * max(
-        1.0, NOISE / max(np.sqrt(variance), 1e-150)
+        1.0, LEAST_NOISE_PX / max(np.sqrt(variance), 1e-150)
     )
-    if deviation < VAGUE:
+    if deviation < VAGUE_SHARE:
         return
     how = (
         f"its standard deviation is {100 * deviation:.0f} % of itself"
@@ -74,7 +77,7 @@ def check_known(
     why = (
         f"{shows} the target (nearly) parallel to one plane, and then distance and focal length cannot be"
         " told apart"
-        if _largest_turn(poses.rotation) < PARALLEL
+        if _largest_turn(poses.rotation) < PARALLEL_ANGLE
         else f"{shows} too little of it, or the lens has more coefficients than they can tell"
     )
     raise CalibrationError(

@@ -21,8 +21,10 @@ from orthoscope.models.parameters import Parameters
 
 __all__ = ["difference_of_images", "image_slopes", "motion_slopes"]
 
-ROUNDS = 20
-SETTLED = 1e-9  # radians, and shares of the distance
+# Newton is given so many steps.
+NEWTON_STEPS = 20
+# A step that moves less, in radians and shares of the distance, is the last.
+SETTLED_STEP = 1e-9
 
 
 def image_slopes(
@@ -31,7 +33,8 @@ def image_slopes(
     """Slopes of the pixels of rays by named parameters of the camera, then by its displacement's coefficients
     along x and along y.
 
-    Raises InputError for a name that the camera does not have.
+    Raises:
+        InputError: a name that the camera does not have.
     """
     parameters = Parameters.of(names)
     parameters.check(camera)
@@ -76,7 +79,7 @@ def difference_of_images(
     """
     wanted = camera.project(fitted)
     turn, shift = np.eye(3), np.zeros(3)
-    for _ in range(ROUNDS):
+    for _ in range(NEWTON_STEPS):
         moved = fitted @ turn.T + shift
         with np.errstate(invalid="ignore"):
             e = other.project(moved) - wanted
@@ -92,7 +95,7 @@ def difference_of_images(
         step = -np.linalg.lstsq(slopes.reshape(-1, slopes.shape[2]), e[known].ravel(), rcond=None)[0]
         turn = rotation_from_vector(step[None, :3])[0] @ turn
         shift = rotation_from_vector(step[None, :3])[0] @ shift + (step[3:] if len(step) > 3 else 0.0)
-        if np.abs(step).max() < SETTLED:
+        if np.abs(step).max() < SETTLED_STEP:
             break
     with np.errstate(invalid="ignore"):
         return other.project(rays @ turn.T + shift) - camera.project(rays)

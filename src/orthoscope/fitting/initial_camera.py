@@ -37,23 +37,27 @@ from orthoscope.solve.losses import Cauchy
 
 __all__ = ["Assumptions", "StartingCameras", "starts", "starts_elsewhere", "suited_lens"]
 
-FIELDS = np.deg2rad(
-    [6, 12, 20, 30, 40, 60, 80, 100, 120, 140, 160, 180, 200, 220, 250]
-)  # diagonal fields of view that are tried
-SCANNED = 12  # views that the scan over them looks at
-SAMPLE = 48  # views that tell whether a base fits, and refine it
-# a pin-hole start that misses by less than this share of the diagonal is taken without looking further
-GOOD = 0.01
-WIDE = np.deg2rad(60.0)  # corners farther from the axis than this ask for a lens of the angle
-STEEP = np.deg2rad(88.0)  # rays farther out than this no lens of the plane is fitted to
-# the principal point's places, from the frame's middle in its sides, where a start off the frame is looked
-# for
-AROUND = [(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if x or y]
-AWAY = 3.0  # of the frame's sides: farther off it no principal point is looked for
-MORE = 3  # starts off the frame that are tried
-ALIKE: dict[
-    type[Formula], tuple[dict[str, float], ...]
-] = {  # coefficients of no distortion, in different valleys of the cost
+# These diagonal fields of view are tried.
+FIELDS_OF_VIEW = np.deg2rad([6, 12, 20, 30, 40, 60, 80, 100, 120, 140, 160, 180, 200, 220, 250])
+# The scan over fields of view looks at so many views.
+SCANNED_VIEWS = 12
+# So many views tell whether a base fits, and refine it.
+SAMPLE_VIEWS = 48
+# A pin-hole start that misses by less than this share of the diagonal is taken without looking further.
+GOOD_SHARE = 0.01
+# Corners farther from the axis than this, radians, ask for a lens of the angle.
+WIDE_ANGLE = np.deg2rad(60.0)
+# No lens of the plane is fitted to rays farther out than this, radians.
+STEEP_ANGLE = np.deg2rad(88.0)
+# A start off the frame is looked for with the principal point at these places, from the frame's middle in its
+# sides.
+PLACES_AROUND = [(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if x or y]
+# No principal point is looked for farther off the frame than so many of its sides.
+FARTHEST_AWAY = 3.0
+# So many starts off the frame are tried.
+MOST_STARTS = 3
+# These coefficients all mean no distortion, and lie in different valleys of the cost.
+NEUTRAL_COEFFICIENTS: dict[type[Formula], tuple[dict[str, float], ...]] = {
     Rational: ({}, {"k1": 1.0, "k4": 1.0}),
 }
 
@@ -123,7 +127,11 @@ class StartingCameras:
     def closed_form_is_off_the_frame(self) -> bool:
         """Whether Zhang's closed form puts the principal point beyond the frame, a camera else."""
         K = intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)
-        return K is not None and _plausible(K, self.image_size, AWAY) and not _plausible(K, self.image_size)
+        return (
+            K is not None
+            and _plausible(K, self.image_size, FARTHEST_AWAY)
+            and not _plausible(K, self.image_size)
+        )
 
     @cached_property
     def elsewhere(self) -> list[Estimate]:
@@ -135,14 +143,16 @@ class StartingCameras:
             return []
         found = [intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)]
         width, height = self.image_size
-        for x, y in AROUND:
+        for x, y in PLACES_AROUND:
             away = np.array([[1.0, 0.0, -x * width], [0.0, 1.0, -y * height], [0.0, 0.0, 1.0]])
             K = intrinsics_of_homographies(away @ self._homographies, self.image_size, CENTRED_SQUARE)
             found.append(K and replace(K, cx=K.cx + x * width, cy=K.cy + y * height))
         starts = [
-            self._pinhole_with(K) for K in found if K is not None and _plausible(K, self.image_size, AWAY)
+            self._pinhole_with(K)
+            for K in found
+            if K is not None and _plausible(K, self.image_size, FARTHEST_AWAY)
         ]
-        return sorted(starts, key=self.misfit)[:MORE]
+        return sorted(starts, key=self.misfit)[:MOST_STARTS]
 
     @cached_property
     def _homographies(self) -> Float[ndarray, "m 3 3"]:
@@ -159,7 +169,7 @@ class StartingCameras:
     @cached_property
     def pinhole_fits(self) -> bool:
         """Whether the pin-hole misses the corners by so little that its lens will do the rest."""
-        return self.pinhole is not None and self.misfit(self.pinhole) < GOOD * float(
+        return self.pinhole is not None and self.misfit(self.pinhole) < GOOD_SHARE * float(
             np.hypot(*self.image_size)
         )
 
@@ -168,9 +178,9 @@ class StartingCameras:
         """The equidistant camera, principal point at the centre, whose focal length suits the corners
         best.
         """
-        some = self.observations.only(self.observations.evenly(SCANNED))
+        some = self.observations.only(self.observations.evenly(SCANNED_VIEWS))
         diagonal = float(np.hypot(*self.image_size))
-        tried = [_equidistant(self.image_size, diagonal / field) for field in FIELDS]
+        tried = [_equidistant(self.image_size, diagonal / field) for field in FIELDS_OF_VIEW]
         misfits = [
             _misfit(Estimate(camera, poses_of_camera(camera, some, self.points)), some, self.points)
             for camera in tried
@@ -182,7 +192,7 @@ class StartingCameras:
         """rms, pixels, by which a base misses the corners of some of the views; infinite where it sees a
         corner nowhere.
         """
-        rows = self.observations.evenly(SAMPLE)
+        rows = self.observations.evenly(SAMPLE_VIEWS)
         return _misfit(
             Estimate(base.camera, base.poses.only(rows)), self.observations.only(rows), self.points
         )
@@ -191,7 +201,7 @@ class StartingCameras:
         """A base camera with its own lens's first coefficients fitted, robustly, in a few steps, to some of
         the views.
         """
-        rows = self.observations.evenly(SAMPLE)
+        rows = self.observations.evenly(SAMPLE_VIEWS)
         camera, some = base.camera, self.observations.only(rows)
         problem = Reprojection(some, self.points, camera, (*self.narrowing.free, *camera.lens.free[:2]))
         loss, options = Cauchy(0.002 * max(self.image_size)), Options(max_steps=30, tolerance=1e-6)
@@ -215,8 +225,11 @@ def starts(
 ) -> list[Estimate]:
     """Where to start from to get a camera with the wanted lens, the likelier first.
 
-    coefficients: those that will move, by default what the lens frees; the others have their usual values.
-    Raises CalibrationError where the corners fit no camera, or lie where the wanted lens cannot see.
+    Args:
+        coefficients: those that will move, by default what the lens frees; the others have their usual
+            values.
+    Raises:
+        CalibrationError: the corners fit no camera, or lie where the wanted lens cannot see.
     """
     coefficients = lens.free if coefficients is None else coefficients
     if lens.chart is GNOMONIC and bases.pinhole is not None and bases.pinhole_fits:
@@ -253,13 +266,13 @@ def starts_elsewhere(
 
 
 def suited_lens(bases: StartingCameras) -> str:
-    """The lens for someone who named none: `brown`, or `kannala_brandt` where corners lie more than WIDE from
-    the axis.
+    """The lens for someone who named none: `brown`, or `kannala_brandt` where corners lie more than
+    WIDE_ANGLE from the axis.
     """
     if bases.pinhole_fits or bases.angle is None:
         return "brown"
     rays = bases.rays(bases.refined(bases.angle))
-    return "kannala_brandt" if rays[:, 2].min(initial=1.0) < np.cos(WIDE) else "brown"
+    return "kannala_brandt" if rays[:, 2].min(initial=1.0) < np.cos(WIDE_ANGLE) else "brown"
 
 
 def _plausible(K: Intrinsics, image_size: tuple[int, int], away: float = 0.0) -> bool:
@@ -300,7 +313,7 @@ def _with_lens(
     converted.
     """
     if isinstance(base.camera.lens, lens) or (isinstance(base.camera.lens, Brown) and lens is Rational):
-        alike = [same for same in ALIKE.get(lens, ({},)) if set(same) <= set(coefficients)]
+        alike = [same for same in NEUTRAL_COEFFICIENTS.get(lens, ({},)) if set(same) <= set(coefficients)]
         return [Estimate(replace(base.camera, lens=lens(**same)), base.poses) for same in alike]
     refined = bases.refined(base)
     rays = bases.rays(refined)
@@ -313,7 +326,7 @@ def _before_steep(rays: Float[ndarray, "n 3"], lens: type[Formula]) -> Float[nda
     """Rays without the few that lie beside or behind the camera; more than a few no lens of the plane can
     see.
     """
-    flat = rays[:, 2] > np.cos(STEEP)
+    flat = rays[:, 2] > np.cos(STEEP_ANGLE)
     if flat.mean() < 0.99:
         farthest = np.degrees(np.arccos(rays[:, 2].min()))
         raise CalibrationError(

@@ -26,16 +26,19 @@ from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["LeaveOneOut", "hat_of", "leave_one_out", "scattered"]
 
-TOLERANCE = 1e-5  # of a view's residual: where conjugate gradients end
-ITERATIONS = 200
-HOPELESS = 1e3  # times the fit's own residual: the others do not tell where this view's corners are
+# Conjugate gradients end at this share of a view's residual.
+TOLERANCE_SHARE = 1e-5
+# Conjugate gradients have at most so many iterations.
+ITERATION_LIMIT = 200
+# Where a residual is this many times the fit's own, the others do not tell where this view's corners are.
+HOPELESS_RATIO = 1e3
 
 
 @dataclass(frozen=True, eq=False)
 class LeaveOneOut:
     """What leaving each view out does.
 
-    Args:
+    Attributes:
         changes: (m,q) of what views share (linearised.py has the order), from the full fit to the one without
             view j; NaN where the other views cannot tell.
         residuals: (m,2p) of view j by the fit without it, pixels, predicted minus detected, not weighted, its
@@ -91,15 +94,15 @@ def _without_themselves(fit: Linearised, e: Float[ndarray, "m n"]) -> tuple[Floa
     y, residual = e.copy(), hat_of(fit, e[..., None])[..., 0]  # from y = e: e - (I - B) e
     direction, square = residual.copy(), (residual**2).sum(1)
     size = np.maximum((e**2).sum(1), 1e-300)
-    for _ in range(ITERATIONS):
-        if (square <= TOLERANCE**2 * size).all():
+    for _ in range(ITERATION_LIMIT):
+        if (square <= TOLERANCE_SHARE**2 * size).all():
             break
         image = direction - hat_of(fit, direction[..., None])[..., 0]
         step = square / np.maximum((direction * image).sum(1), 1e-300)
-        step[square <= TOLERANCE**2 * size] = 0.0
+        step[square <= TOLERANCE_SHARE**2 * size] = 0.0
         y += step[:, None] * direction
         residual -= step[:, None] * image
         before, square = square, (residual**2).sum(1)
         direction = residual + (square / np.maximum(before, 1e-300))[:, None] * direction
-    known = np.isfinite(y).all(1) & (square <= 1e-4 * size) & ((y**2).sum(1) < HOPELESS**2 * size)
+    known = np.isfinite(y).all(1) & (square <= 1e-4 * size) & ((y**2).sum(1) < HOPELESS_RATIO**2 * size)
     return y, known

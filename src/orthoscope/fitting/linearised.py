@@ -29,7 +29,9 @@ from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_
 
 __all__ = ["Linearised", "ResidualSlopes"]
 
-ROUNDING = 1e-13  # of a scaled system: what is added to its diagonal before it is inverted
+# This is added to a scaled system's diagonal before it is inverted.
+ROUNDING_SHARE = 1e-13
+# A corner has so many coordinates.
 SPACE = 3
 
 
@@ -37,7 +39,7 @@ SPACE = 3
 class ResidualSlopes:
     """How the residuals of m views of p corners move, not weighted; 0 where a corner was not seen.
 
-    Args:
+    Attributes:
         camera: (m,k,2p) by the camera's named parameters.
         pose: (m,6,2p) by the pose of the view.
         spline: (m,p,g) value of each spline of the lens's displacement at each corner; g = 0 for a formula.
@@ -64,7 +66,7 @@ class ResidualSlopes:
 class Linearised:
     """A finished fit at its estimate.
 
-    Args:
+    Attributes:
         camera: where the fit ended.
         names: of the camera's k parameters that moved.
         slopes: of the residuals.
@@ -298,6 +300,6 @@ def _inverse(matrix: Float[ndarray, "s s"]) -> Float[ndarray, "s s"]:
     """Of a symmetric positive system, whatever its units."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix * scale * scale[:, None]
-    scaled[np.diag_indices_from(scaled)] += ROUNDING
+    scaled[np.diag_indices_from(scaled)] += ROUNDING_SHARE
     inverse = np.linalg.inv(scaled)
     return 0.5 * (inverse + inverse.T) * scale * scale[:, None]

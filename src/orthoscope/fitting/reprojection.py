@@ -24,6 +24,7 @@ from orthoscope.solve.losses import Loss
 
 __all__ = ["POSE", "Estimate", "Places", "Reprojection"]
 
+# A pose has so many parameters.
 POSE = 6
 
 
@@ -116,8 +117,10 @@ class Reprojection:
     def stack(self, estimate: Estimate, chunk: Chunk, places: Places) -> ndarray:
         """(views, columns, 2 n): d/d shared, d/d pose, residual; first n of a row for u, the others for v.
 
-        places: of the chunk's corners in the target's frame. The array is the problem's own and is written
-        again by the next call.
+        The array is the problem's own and is written again by the next call.
+
+        Args:
+            places: of the chunk's corners in the target's frame.
         """
         camera, poses = estimate
         rotation, translation = poses.rotation[chunk.rows, :, :, None], poses.translation[chunk.rows, :, None]

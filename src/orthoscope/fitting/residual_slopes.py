@@ -19,6 +19,7 @@ from orthoscope.models.free_lens import FreeLens
 
 __all__ = ["by_corner", "residual_slopes", "spline_values"]
 
+# A corner has so many coordinates.
 SPACE = 3
 
 

@@ -32,21 +32,25 @@ from orthoscope.models.target_shape import polynomials
 
 __all__ = ["ORDERS", "Scatter", "likenesses", "patterns_over_views", "scatter_of"]
 
+# Patterns over a board have these orders: a pose takes those below, and of those above errors are as good as
+# independent.
 ORDERS = (
     2,
     3,
     4,
-)  # of patterns over a board: a pose takes those below, and of those above errors are as good as independent
-ENOUGH = 40  # views that tell how alike errors are
-# of a pattern's length: what is left of it after pose and patterns before it is rounding when it is no more
-THIN = 1e-6
+)
+# So many views tell how alike errors are.
+VIEW_COUNT = 40
+# What is left of a pattern after pose and patterns before it is rounding when it is no more than this share
+# of its length.
+THIN_SHARE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
     """What is known of how far a camera is from the true one, to first order.
 
-    Args:
+    Attributes:
         camera: where its fit ended.
         names: of its k parameters that moved; the displacement's coefficients, along x and then along y, come
             after them.
@@ -85,7 +89,7 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
     Args:
         points: the target's corners, nominal.
     """
-    some = fit.only(_evenly(fit.views, ENOUGH))
+    some = fit.only(_evenly(fit.views, VIEW_COUNT))
     patterns = patterns_over_views(some, points)
     tau = likenesses(some, patterns)
     camera = np.zeros((fit.of_camera, fit.of_camera))
@@ -120,7 +124,7 @@ def patterns_over_views(
     raw = fit.root[..., None] * np.concatenate(columns, axis=1)
     rows = fit.without_pose(raw)
     basis, triangle = np.linalg.qr(rows)
-    kept = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) > THIN * np.sqrt((raw**2).sum(1))
+    kept = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) > THIN_SHARE * np.sqrt((raw**2).sum(1))
     basis = fit.without_pose(basis * kept[:, None])
     return np.split(basis, np.cumsum(sizes)[:-1], axis=2)
 

@@ -38,7 +38,7 @@ ENOUGH_CORNERS = 4000
 class Exportable(NamedTuple):
     """A camera that a tool can hold, and how far its images are from those of the camera that was asked for.
 
-    Args:
+    Attributes:
         camera: as the tool holds it, in our pixels.
         apart_px: distance on average.
         farthest_px: distance at most.
@@ -59,7 +59,7 @@ class Exportable(NamedTuple):
 class Exported(NamedTuple):
     """What was written.
 
-    Args:
+    Attributes:
         tool: the record of the tool.
         held: the camera that stands in the file, and what it costs.
         files: that were written.

@@ -1,7 +1,8 @@
 """lensfun's database (XML): a polynomial of the radius that is about one image, not about a focal length.
 
-The radius is measured in halves of the shorter side (between the centres of the first and the last pixel),
-before (r_u) and after (r_d) distortion:
+The radius is measured, before (r_u) and after (r_d) distortion, in halves of the shorter side (between the
+centres of the first and the last pixel) of an image with the diagonal of this one and the lens's own aspect
+ratio, 3:2 where it says none:
 
     poly3   r_d = r_u (1 - k1 + k1 r_u^2)
     poly5   r_d = r_u (1 + k1 r_u^2 + k2 r_u^4)
@@ -33,6 +34,8 @@ __all__ = ["LENSFUN"]
 FRAME_MM = (36.0, 24.0)
 # Lenses of one database that are looked at; the shipped ones have some hundreds.
 MOST_LENSES = 10_000
+# No frame is so many times longer than wide.
+MOST_OBLONG = 100.0
 
 
 def _recognises(document: Document) -> bool:
@@ -60,11 +63,13 @@ def _camera(lens: Element, distortion: Element, size: tuple[int, int], document:
     def value(name: str) -> float:
         return number(distortion.get(name, "0"), name, document)
 
-    half, focal = _half(size), _focal_px(lens, distortion, size, document)
-    middle, ratio = 0.5 * (np.array(size) - 1.0), focal / half
+    focal = _focal_px(lens, distortion, size, document)
+    middle, ratio = 0.5 * (np.array(size) - 1.0), focal / _unit(lens, size, document)
     centre = lens.find("center")
     if centre is not None:
-        middle = middle + half * np.array([number(centre.get(name, "0"), name, document) for name in "xy"])
+        middle = middle + _half(size) * np.array(
+            [number(centre.get(name, "0"), name, document) for name in "xy"]
+        )
     word = distortion.get("model", "")
     if word == "poly5":
         made = Brown(k1=value("k1") * ratio**2, k2=value("k2") * ratio**4)
@@ -101,8 +106,22 @@ def _focal_px(lens: Element, distortion: Element, size: tuple[int, int], documen
 
 
 def _half(size: tuple[int, int]) -> float:
-    """The tool's unit of length, pixels."""
+    """Half of the shorter side, pixels: the unit of the centre's shift."""
     return 0.5 * max(min(size) - 1, 1)
+
+
+def _unit(lens: Element, size: tuple[int, int], document: Document) -> float:
+    """The unit of the radius, pixels."""
+    words = (lens.findtext("aspect-ratio") or "3:2").split(":")
+    across, down = (number(word, "aspect-ratio", document) for word in (*words, "1")[:2])
+    if not (across > 0 and down > 0 and 1.0 / MOST_OBLONG < across / down < MOST_OBLONG):
+        raise document.refuse(f"has an aspect ratio of {':'.join(words)[:40]!r}; expected one such as 3:2")
+    return 0.5 * math.hypot(*_sides(size)) / math.hypot(across / down, 1.0)
+
+
+def _sides(size: tuple[int, int]) -> tuple[int, int]:
+    """Between the centres of the first and the last pixel, the longer one first."""
+    return max(max(size) - 1, 1), max(min(size) - 1, 1)
 
 
 def _write(contents: Contents, place: Path) -> Files:
@@ -126,11 +145,11 @@ def _write(contents: Contents, place: Path) -> Files:
     mm = focal * math.hypot(*FRAME_MM) / math.hypot(*camera.image_size)
     dx, dy = (np.array([cx, cy]) - 0.5 * (np.array(camera.image_size) - 1.0)) / half
     attributes = " ".join(f'{name}="{value!r}"' for name, value in coefficients.items())
-    width, height = camera.image_size
+    across, down = _sides(camera.image_size)  # so that its unit is half of the shorter side
     return {
         place: '<lensdatabase version="1">\n  <lens>\n    <maker>orthoscope</maker>\n'
         f"    <model>{escape(contents.name)}</model>\n    <mount>{escape(contents.name)}</mount>\n"
-        f"    <cropfactor>1</cropfactor>\n    <aspect-ratio>{width}:{height}</aspect-ratio>\n"
+        f"    <cropfactor>1</cropfactor>\n    <aspect-ratio>{across}:{down}</aspect-ratio>\n"
         f'    <center x="{float(dx)!r}" y="{float(dy)!r}"/>\n    <calibration>\n'
         f'      <distortion model="{holding.word}" focal="{mm!r}" {attributes}/>\n'
         "    </calibration>\n  </lens>\n"

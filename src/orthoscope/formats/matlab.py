@@ -35,10 +35,13 @@ DTYPES = {
 }  # fmt: skip
 STRUCT_CLASS, CHAR_CLASS, DOUBLE_CLASS, OPAQUE_CLASS = 2, 4, 6, 17
 NUMERIC_CLASSES = range(DOUBLE_CLASS, 16)
-NAME_LENGTH = 32  # bytes of a field's name
+# A field's name has so many bytes.
+NAME_LENGTH = 32
 # What reading damaged bytes may raise; a generator that ends too soon is a RuntimeError.
 DAMAGED = (struct.error, zlib.error, ValueError, LookupError, ArithmeticError, MemoryError, RuntimeError)
-DEEPEST = 8  # structs within structs
+# Structs stand within structs at most so deep.
+DEEPEST_STRUCTS = 8
+# A struct has at most so many fields.
 MOST_FIELDS = 4096
 
 
@@ -159,7 +162,7 @@ def _structs(variables: Mapping[str, Any], within: str = "") -> Iterator[tuple[s
 
 def _variables(content: bytes, order: str, depth: int) -> Iterator[tuple[str, Any]]:
     """Name and value of each matrix in the bytes."""
-    if depth > DEEPEST:
+    if depth > DEEPEST_STRUCTS:
         raise ValueError("structs within structs without end")
     for kind, data in _elements(content, order):
         if kind == COMPRESSED:
@@ -205,7 +208,9 @@ def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Any]:
             for i in range(0, len(names), length)
         ]
         values = [
-            _matrix(part, order, depth + 1)[1] if kind == MATRIX and part and depth < DEEPEST else None
+            _matrix(part, order, depth + 1)[1]
+            if kind == MATRIX and part and depth < DEEPEST_STRUCTS
+            else None
             for kind, part in parts
         ]
         return name, dict(zip(fields, values, strict=True))

@@ -21,7 +21,8 @@ from orthoscope.models.opencv_order import OPENCV_ORDER
 
 __all__ = ["PHOTONVISION"]
 
-DOUBLES = 6  # OpenCV's number for a matrix of doubles
+# This is OpenCV's number for a matrix of doubles.
+DOUBLES_TYPE = 6
 
 
 def _recognises(document: Document) -> bool:
@@ -50,7 +51,7 @@ def _write(contents: Contents, place: Path) -> Files:
 
     def block(values: ndarray) -> dict[str, Any]:
         rows, columns = values.shape
-        return {"rows": rows, "cols": columns, "type": DOUBLES, "data": values.ravel().tolist()}
+        return {"rows": rows, "cols": columns, "type": DOUBLES_TYPE, "data": values.ravel().tolist()}
 
     width, height = camera.image_size
     table = {

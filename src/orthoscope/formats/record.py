@@ -36,7 +36,7 @@ BEYOND_GRID = (64, 48)
 class Contents:
     """What a tool's file holds.
 
-    Args:
+    Attributes:
         camera: with the tool's pixel origin.
         poses: camera_from_world of each photograph, by its name; the world is the target's frame.
         name: of the camera, where the tool names cameras.
@@ -52,7 +52,7 @@ class Contents:
 class Holding(NamedTuple):
     """A lens that a tool has.
 
-    Args:
+    Attributes:
         lens: its name in LENSES.
         word: the tool's name for it.
         coefficients: in the tool's order; a name that the lens does not have is written as 0.
@@ -93,7 +93,7 @@ class Holding(NamedTuple):
 class Format:
     """A tool's file.
 
-    Args:
+    Attributes:
         name: as `--to` takes it.
         title: the tool and its file, for people.
         suffixes: of its files, the usual one first; where there are several, the suffix says which is

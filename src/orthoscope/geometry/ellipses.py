@@ -18,13 +18,14 @@ from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["Ellipses", "fit_ellipses"]
 
-FEWEST = 5  # points of an ellipse
+# An ellipse needs this many points.
+FEWEST_POINTS = 5
 
 
 class Ellipses(NamedTuple):
     """Several ellipses; NaN where there is none.
 
-    Args:
+    Attributes:
         centres: (n,2).
         axes: (n,2,2) maps the unit circle about 0 onto each, moved to 0; symmetric.
     """
@@ -45,7 +46,7 @@ def fit_ellipses(rims: Float[ndarray, "n k 2"]) -> Ellipses:
     middle = points.sum(1) / count
     points = np.where(seen[..., None], rims - middle[:, None], 0.0)
     spread = np.einsum("nki,nkj->nij", points, points) / count[..., None] * 2.0
-    usable = (seen.sum(1) >= FEWEST) & (np.linalg.det(spread) > 0)
+    usable = (seen.sum(1) >= FEWEST_POINTS) & (np.linalg.det(spread) > 0)
     spread[~usable] = np.eye(2)
     whole = np.linalg.cholesky(spread)
     x, y = np.moveaxis(np.linalg.solve(whole[:, None], points[..., None])[..., 0], -1, 0)

@@ -17,7 +17,14 @@ from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.blas import with_one_thread
-from orthoscope.methods.settings import DecoupledSettings, FccmSettings, MldcSettings, NmldcSettings
+from orthoscope.methods.settings import (
+    DecoupledSettings,
+    FccmSettings,
+    FitzgibbonSettings,
+    HartleyKangSettings,
+    MldcSettings,
+    NmldcSettings,
+)
 from orthoscope.targets.detections import Detections
 
 __all__ = ["METHODS", "calibrate", "check_settings", "settings_of"]
@@ -45,6 +52,8 @@ METHODS = _Methods(
         "fccm": f"{__name__}.fccm",
         "mldc": f"{__name__}.mldc.mldc",
         "nmldc": f"{__name__}.mldc.nmldc",
+        "hartley_kang": f"{__name__}.radial_curve.hartley_kang",
+        "fitzgibbon": f"{__name__}.radial_curve.fitzgibbon",
     }
 )
 
@@ -80,6 +89,14 @@ def calibrate(
     detections: Detections, *, method: Literal["mldc"], **settings: Unpack[MldcSettings]
 ) -> Calibration: ...
 @overload
+def calibrate(
+    detections: Detections, *, method: Literal["hartley_kang"], **settings: Unpack[HartleyKangSettings]
+) -> Calibration: ...
+@overload
+def calibrate(
+    detections: Detections, *, method: Literal["fitzgibbon"], **settings: Unpack[FitzgibbonSettings]
+) -> Calibration: ...
+@overload
 def calibrate(detections: Detections, *, method: str, **settings: Any) -> Calibration: ...
 @with_one_thread
 def calibrate(detections: Detections, *, method: str = "decoupled", **settings: Any) -> Calibration:
@@ -89,8 +106,9 @@ def calibrate(detections: Detections, *, method: str = "decoupled", **settings: 
     Discs are calibrated twice: what a first fit says of their tilt moves the centres of their outlines to
     where the discs' centres are seen (`fitting/disc_centres.py`).
 
-    Raises CalibrationError where the views cannot tell the camera, InputError for a method or a setting that
-    is none.
+    Raises:
+        CalibrationError: the views cannot tell the camera.
+        InputError: a method or a setting that is none.
     """
     check_settings(method, settings)
     found = METHODS[method](detections, **settings)
@@ -142,7 +160,8 @@ def _told(kind: Any) -> str:
 def settings_of(method: str) -> list[str]:
     """The names of a method's settings.
 
-    Raises InputError for a method that is none.
+    Raises:
+        InputError: a method that is none.
     """
     if method not in METHODS:
         raise InputError(f"method {method!r} is not known; expected one of {', '.join(METHODS)}.")

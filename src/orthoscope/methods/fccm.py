@@ -41,19 +41,24 @@ from orthoscope.version import __version__
 __all__ = ["fccm", "fit_flat"]
 
 AUTO = "auto"
-# share of the cost; of a million numbers that is 1e-4 of one's variance: nothing known moves by 1 % of its
-# deviation
-TOLERANCE = 1e-10
-SAMPLE = 64  # corners of each view that are enough to come near the minimum
-NEARLY = Options(max_steps=50, tolerance=1e-3, trusting=True)
-# coefficients of a lens, the first, that such a sample tells; a denominator's would start in a valley of the
-# sample's own
-FIRM = 5
-# an rms below this share of the diagonal is a minimum worth having; above it the other start is tried too
-ADEQUATE = 0.003
-LONG_WALK = 25  # steps; so many speak of a flat valley, and where corners are FEW there are often others
-FEW = 2000  # corners
-SQUARE = 1.1  # times longer than wide: cameras have no pixels that are less square
+# Of a million numbers' cost this share is 1e-4 of one's variance: nothing known moves by 1 % of its
+# deviation.
+COST_TOLERANCE = 1e-10
+# So many corners of each view are enough to come near the minimum.
+SAMPLE_CORNERS = 64
+# The sample's fit need not be exact.
+ROUGH_OPTIONS = Options(max_steps=50, tolerance=1e-3, trusting=True)
+# A sample of the corners tells so many of a lens's coefficients, the first; a denominator's would start in a
+# valley of the sample's own.
+FIRM_COEFFICIENTS = 5
+# An rms below this share of the diagonal is a minimum worth having; above it the other start is tried too.
+ADEQUATE_SHARE = 0.003
+# So many steps speak of a flat valley, and where corners are few there are often others.
+LONG_WALK_STEPS = 25
+# Corners are few up to this number.
+FEW_CORNERS = 2000
+# No camera has pixels that are so many times longer than wide.
+MOST_ASPECT_RATIO = 1.1
 
 
 @with_one_thread
@@ -116,7 +121,7 @@ def fit_flat(
     used = with_usable_views(detections)
     narrowing = Assumptions.of(len(used.views), skew=skew)
     observations = Observations.of(used)
-    sample = observations.thinned(SAMPLE)
+    sample = observations.thinned(SAMPLE_CORNERS)
     bases = StartingCameras(sample, used.target.points, used.image_size, narrowing)
     lens = suited_lens(bases) if lens == AUTO else lens
     kind, coefficients = (parse_centred_lens if own_centre else parse_lens)(lens)
@@ -124,7 +129,7 @@ def fit_flat(
     check_enough(used, free)
     cost, options = (
         LOSSES[loss](loss_scale),
-        Options(max_steps=max_steps, tolerance=TOLERANCE, trusting=True, progress=progress),
+        Options(max_steps=max_steps, tolerance=COST_TOLERANCE, trusting=True, progress=progress),
     )
     estimates = starts(bases, kind, coefficients=coefficients)
     if sample is not observations:
@@ -177,9 +182,12 @@ def fit_flat(
 
 def _nearer(start: Estimate, bases: StartingCameras, free: tuple[str, ...], loss: Loss) -> Estimate:
     """A start brought near the minimum on the bases' sample of corners, with the parameters that it tells."""
-    firm = [name for name in free if name not in start.camera.lens.names()[FIRM:]]
+    firm = [name for name in free if name not in start.camera.lens.names()[FIRM_COEFFICIENTS:]]
     return solve(
-        Reprojection(bases.observations, bases.points, start.camera, firm), start, loss=loss, options=NEARLY
+        Reprojection(bases.observations, bases.points, start.camera, firm),
+        start,
+        loss=loss,
+        options=ROUGH_OPTIONS,
     ).unknowns
 
 
@@ -189,7 +197,11 @@ def _is_doubtful(solution: Solution[Estimate], bases: StartingCameras) -> bool:
     """
     K, (width, height) = solution.unknowns.camera.intrinsics, bases.image_size
     inside = 0.0 < K.cx < width and 0.0 < K.cy < height
-    return not inside or not 1.0 / SQUARE < K.fx / K.fy < SQUARE or bases.closed_form_is_off_the_frame
+    return (
+        not inside
+        or not 1.0 / MOST_ASPECT_RATIO < K.fx / K.fy < MOST_ASPECT_RATIO
+        or bases.closed_form_is_off_the_frame
+    )
 
 
 def _best(
@@ -206,7 +218,7 @@ def _best(
     all; and of all of them, where one is known.
     """
     known = best
-    enough = used.corners * float(loss.cost(np.array((ADEQUATE * np.hypot(*used.image_size)) ** 2)))
+    enough = used.corners * float(loss.cost(np.array((ADEQUATE_SHARE * np.hypot(*used.image_size)) ** 2)))
     for estimate in estimates:
         problem = Reprojection(observations, used.target.points, estimate.camera, free)
         solution = solve(problem, estimate, loss=loss, options=options)
@@ -219,7 +231,7 @@ def _best(
         if solution.status is not Status.NO_COST and (best is None or solution.cost < best.cost):
             best = solution
         ends_well = best is not None and best.cost < enough
-        if ends_well and known is None and (solution.steps < LONG_WALK or used.corners > FEW):
+        if ends_well and known is None and (solution.steps < LONG_WALK_STEPS or used.corners > FEW_CORNERS):
             break
     if best is None:
         raise CalibrationError(_no_start(estimates[0], observations, used))

@@ -25,11 +25,11 @@ from orthoscope.solve.losses import Loss
 
 __all__ = ["CENTRE_OPEN", "centre_is_told", "with_own_centre"]
 
-NOISE = 0.1  # px: corners are never taken to be better than this when asking whether they tell the centre
-# Of the diagonal: a centre less certain than this is not known. Fitted to noise alone, a lens has one that
-# seems
-# certain to 2 or 3 %.
-VAGUE = 0.01
+# Corners are never taken to be better than this, pixels, when asking whether they tell the centre.
+LEAST_NOISE_PX = 0.1
+# A centre less certain than this share of the diagonal is not known: fitted to noise alone, a lens has one
+# that seems certain to 2 or 3 %.
+VAGUE_SHARE = 0.01
 
 CENTRE_OPEN = "the views do not tell the distortion centre; it is taken at the principal point"
 
@@ -91,6 +91,6 @@ def centre_is_told(
     assert frame is not None
     names = Parameters.of(free).names
     spread = np.diag(covariance)[[names.index(name) for name in CENTRE]].max()
-    deviation = np.sqrt(spread) * max(1.0, NOISE / max(sigma, 1e-150))
+    deviation = np.sqrt(spread) * max(1.0, LEAST_NOISE_PX / max(sigma, 1e-150))
     inside = 0 <= frame.cx <= width - 1 and 0 <= frame.cy <= height - 1
-    return inside and bool(deviation < VAGUE * np.hypot(width, height))
+    return inside and bool(deviation < VAGUE_SHARE * np.hypot(width, height))

@@ -23,24 +23,28 @@ from orthoscope.models.parameters import Parameters
 from orthoscope.models.pixel_slopes import PixelSlopes
 from orthoscope.models.smooth_map import smooth_map
 
-__all__ = ["LARGEST_SIDE", "WIDEST", "Camera", "Intrinsics", "image_border"]
+__all__ = ["LARGEST_SIDE", "WIDEST_ANGLE", "Camera", "Intrinsics", "image_border"]
 
 # The lens of a camera without any.
 PIN_HOLE = Brown()
 # A straight view of `valid` places keeps this far inside the photograph, pixels: an interpolation rounds.
-EDGE = 1e-3
-# Halvings by which the scale of such a view is found, and the share by which another middle must be better.
-BISECTIONS, STEP_GAIN = 14, 1e-3
+EDGE_PX = 1e-3
+# The scale of a straight view is found by so many halvings.
+BISECTION_STEPS = 14
+# Another middle of a straight view must be better by this share.
+GAIN_SHARE = 1e-3
 # No image has a side of more pixels; a file that says so is damaged.
 LARGEST_SIDE = 1_000_000
-WIDEST = np.deg2rad(75.0)  # rays farther from the axis than this a pin-hole stretches without end
+# Rays farther from the axis than this, radians, a pin-hole stretches without end.
+WIDEST_ANGLE = np.deg2rad(75.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Intrinsics:
     """The pin-hole, pixels: u = fx x + skew y + cx, v = fy y + cy.
 
-    Raises InputError where a focal length is not positive or a number is not finite.
+    Raises:
+        InputError: a focal length is not positive or a number is not finite.
     """
 
     fx: float
@@ -99,9 +103,12 @@ class Intrinsics:
 class Camera:
     """A calibrated camera.
 
-    image_size: (width, height). lens_frame: intrinsics of the lens's own plane where its distortion centre is
-    not the principal point; None means the intrinsics themselves. Raises InputError for an image without
-    size.
+    Attributes:
+        image_size: (width, height).
+        lens_frame: intrinsics of the lens's own plane where its distortion centre is not the principal point;
+            None means the intrinsics themselves.
+    Raises:
+        InputError: an image without size.
     """
 
     image_size: tuple[int, int]
@@ -319,9 +326,11 @@ class Camera:
         """For each pixel of the straight image, where to look in the photograph: x and y, float32 as
         cv2.remap takes them.
 
-        straight, size: intrinsics and (width, height) of the straight image, by default this camera's. NaN
-        where a ray lies beyond the lens's domain or its image outside the photograph by more than a pixel, so
-        that nothing folds back.
+        NaN where a ray lies beyond the lens's domain or its image outside the photograph by more than a
+        pixel, so that nothing folds back.
+
+        Args:
+            straight, size: intrinsics and (width, height) of the straight image, by default this camera's.
         """
         size, pin_hole = size or self.image_size, straight or self.intrinsics
 
@@ -336,7 +345,7 @@ class Camera:
         )
 
     def straight_intrinsics(
-        self, keep: str = "all", widest: float = WIDEST, size: tuple[int, int] | None = None
+        self, keep: str = "all", widest: float = WIDEST_ANGLE, size: tuple[int, int] | None = None
     ) -> Intrinsics:
         """A pin-hole for the straight image, with this camera's aspect, so that squares stay squares.
 
@@ -385,10 +394,10 @@ class Camera:
             if (plane * plane).sum(1).max() > farthest * farthest:
                 return False
             seen = self.project(_in_front(plane))
-            return bool(((seen >= EDGE) & (seen <= limits - EDGE)).all())  # NaN fits nowhere
+            return bool(((seen >= EDGE_PX) & (seen <= limits - EDGE_PX)).all())  # NaN fits nowhere
 
         def least(middle: ndarray, low: float, high: float, pixels: ndarray) -> float:
-            for _ in range(BISECTIONS):
+            for _ in range(BISECTION_STEPS):
                 if fits(middle, between := np.sqrt(low * high), pixels):
                     high = between
                 else:
@@ -407,11 +416,11 @@ class Camera:
         for step in (0.08, 0.04, 0.02, 0.01):
             for side in (*np.diag(reach), *-np.diag(reach)):
                 moved = middle + step * side / scale
-                while fits(moved, scale * (1.0 - STEP_GAIN), few):
-                    middle, scale = moved, least(moved, 0.5 * scale, scale * (1.0 - STEP_GAIN), few)
+                while fits(moved, scale * (1.0 - GAIN_SHARE), few):
+                    middle, scale = moved, least(moved, 0.5 * scale, scale * (1.0 - GAIN_SHARE), few)
                     moved = middle + step * side / scale
         while not fits(middle, scale, every):
-            scale *= 1.0 + STEP_GAIN
+            scale *= 1.0 + GAIN_SHARE
         return middle, scale
 
     def _lens_rays(self, points: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:

@@ -23,9 +23,9 @@ from orthoscope.models.spline import Displacement
 
 __all__ = ["FreeLens"]
 
-# rounds of b <- (x_d, y_d) - s(b): a start for the inverse that is good to the third power of the
-# displacement's slope
-BACK = 3
+# So many rounds of b <- (x_d, y_d) - s(b) give the inverse a start that is good to the third power of the
+# displacement's slope.
+BACK_ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,8 @@ class FreeLens(Lens):
     """A formula, `base`, and a displacement of its distorted plane by bicubic splines, `over`; named
     coefficients are the formula's.
 
-    Raises InputError where the base is a free lens itself.
+    Raises:
+        InputError: the base is a free lens itself.
     """
 
     base: Lens
@@ -97,7 +98,7 @@ class FreeLens(Lens):
 
     def unwarp(self, x_d: ndarray, y_d: ndarray) -> tuple[ndarray, ndarray]:
         b_x, b_y = x_d, y_d
-        for _ in range(BACK):
+        for _ in range(BACK_ROUNDS):
             s, _, _ = self.over.at(b_x, b_y)
             b_x, b_y = x_d - s[..., 0], y_d - s[..., 1]
         start = self.base.unwarp(b_x, b_y)

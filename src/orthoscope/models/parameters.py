@@ -41,7 +41,7 @@ FOCAL_LENGTHS = ("fx", "fy")
 class Parameters:
     """The free parameters of one camera, in order; each is a group of names that are tied together.
 
-    Args:
+    Attributes:
         groups: the names of each.
         camera: whose they are, in a rig; empty where there is one camera only.
     """

@@ -26,8 +26,8 @@ from orthoscope.models.lens import RadialLens
 
 __all__ = ["Division", "Fet", "Fov", "KannalaBrandt", "Pfet", "Stereographic"]
 
-# theta^2 up to which a series is exact to rounding where a closed form loses its digits.
-SERIES_TO = 1e-4
+# Up to this theta^2 a series is exact to rounding where a closed form loses its digits.
+SERIES_LIMIT = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -166,7 +166,7 @@ class Stereographic(RadialLens):
     free: ClassVar[tuple[str, ...]] = ()
 
     def gain(self, u: ndarray) -> tuple[ndarray, ndarray]:
-        small = u < SERIES_TO
+        small = u < SERIES_LIMIT
         safe = np.where(small, 1.0, u)
         s = np.sqrt(safe)
         t = np.tan(0.5 * s)

@@ -1,13 +1,13 @@
 """A map of an image's pixels, asked for at few of them and interpolated between, where that is as good as
 asking for each.
 
-The image is cut into tiles of about SIDE pixels. On each the map is the polynomial of degree N - 1 in x and
-in y through its values at N x N Chebyshev points, which lie on the tile's sides too, so that neighbours share
-them and no seam shows. A lens is analytic within its domain, so a polynomial's error falls geometrically with
-N; it is greatest half-way between the points and is looked up there. For a usual lens it is far below what
-float32 rounds; beside a fold, or with a spline in the lens, it is some ten-thousandths of a pixel. A tile is
-asked pixel by pixel where that error is above TOLERANCE, or where it has a corner for which the caller does
-not vouch: the border of a lens's domain is never interpolated.
+The image is cut into tiles of about TILE_SIDE pixels. On each the map is the polynomial of degree N - 1 in x
+and in y through its values at N x N Chebyshev points, which lie on the tile's sides too, so that neighbours
+share them and no seam shows. A lens is analytic within its domain, so a polynomial's error falls
+geometrically with N; it is greatest half-way between the points and is looked up there. For a usual lens it
+is far below what float32 rounds; beside a fold, or with a spline in the lens, it is some ten-thousandths of a
+pixel. A tile is asked pixel by pixel where that error is above TOLERANCE_PX, or where it has a corner for
+which the caller does not vouch: the border of a lens's domain is never interpolated.
 
 L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 8 (convergence) and 15
 (Lebesgue constants).
@@ -23,15 +23,19 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from orthoscope.geometry.arrays import Bool, Float, ndarray
 
-__all__ = ["TOLERANCE", "smooth_map"]
+__all__ = ["TOLERANCE_PX", "smooth_map"]
 
-SIDE = 64  # pixels of a tile
+# A tile has so many pixels along a side.
+TILE_SIDE = 64
+# A tile has so many Chebyshev points along a side.
 N = 6
-TOLERANCE = 1e-3  # px; cv2.remap itself rounds places to 1/32 px
-# a polynomial in x and y is nowhere on its tile larger than this times its largest value at the points
-LEBESGUE = 4.0
-# px: a pixel whose place is as near as this to the limits is asked for itself; several times TOLERANCE
-DOUBT = 5e-3
+# A place may be off by this, pixels; cv2.remap itself rounds places to 1/32.
+TOLERANCE_PX = 1e-3
+# A polynomial in x and y is nowhere on its tile larger than this times its largest value at the points.
+LEBESGUE_CONSTANT = 4.0
+# A pixel whose place is as near as this to the limits, pixels, is asked for itself; it is several times
+# TOLERANCE_PX.
+DOUBT_PX = 5e-3
 
 Look = Callable[[Float[ndarray, "n 2"]], Float[ndarray, "n 2"]]
 Vouched = Callable[[Float[ndarray, "n 2"]], Bool[ndarray, " n"]]
@@ -67,18 +71,20 @@ def smooth_map(
     look: Look, size: tuple[int, int], *, vouched: Vouched, limits: tuple[int, int]
 ) -> tuple[Float[ndarray, "h w"], Float[ndarray, "h w"]]:
     """x and y of what `look` says of each pixel of an image of `size` (width, height), float32, to within
-    TOLERANCE and rounding.
+    TOLERANCE_PX and rounding.
 
-    look: pixels (n,2) to places (n,2), NaN where there are none. vouched: of pixels (n,2), whether `look` is
-    smooth there; where it is at the corners of a rectangle it must be all over it. limits: (width, height) of
-    what is looked at; places farther out than a pixel are NaN.
+    Args:
+        look: pixels (n,2) to places (n,2), NaN where there are none.
+        vouched: of pixels (n,2), whether `look` is smooth there; where it is at the corners of a rectangle it
+            must be all over it.
+        limits: (width, height) of what is looked at; places farther out than a pixel are NaN.
     """
     (width, height), seen = size, np.array(limits, dtype=float)
     within = _Limits(0.5 * (seen - 1.0), 0.5 * (seen + 1.0))
     across, down = _tiles(width), _tiles(height)
     values = _at(look, across.points, down.points)
     plain = _of_corners(np.logical_and, _on_corners(vouched, across, down)) & (
-        _errors(look, values, across, down) <= TOLERANCE
+        _errors(look, values, across, down) <= TOLERANCE_PX
     )
     maps = _interpolated(values, across, down, size)
     unsure = [np.empty((0, 2), dtype=np.int64)]
@@ -94,7 +100,7 @@ def smooth_map(
 
 
 def _tiles(length: int) -> _Tiles:
-    number = -(-length // SIDE)
+    number = -(-length // TILE_SIDE)
     side = -(-length // number)
     starts = np.arange(number)[:, None]
     points, between = starts + _points(), starts + _points(half_way=True)
@@ -189,7 +195,7 @@ def _inside(values: ndarray, within: _Limits) -> Bool[ndarray, "rows columns"]:
         :, :, None, :, 1:
     ]  # (2, N, N, tiles down, tiles across)
     rest = np.abs(np.moveaxis(_windows(_windows(values, 1), 2), (3, 4), (1, 2)) - bilinear).max((1, 2))
-    return (_of_corners(np.maximum, np.abs(corners - middle)) + LEBESGUE * rest < reach).all(0)
+    return (_of_corners(np.maximum, np.abs(corners - middle)) + LEBESGUE_CONSTANT * rest < reach).all(0)
 
 
 def _runs(flags: Bool[ndarray, "rows columns"]) -> Iterator[tuple[slice, slice]]:
@@ -211,5 +217,5 @@ def _cut(maps: Float[ndarray, "2 h w"], within: _Limits) -> ndarray:
     past_y -= np.float32(within.reach[1])
     np.maximum(past, past_y, out=past)
     np.copyto(maps, np.nan, where=past > 0)
-    y, x = np.divmod(np.flatnonzero(np.abs(past, out=past) < DOUBT), past.shape[1])
+    y, x = np.divmod(np.flatnonzero(np.abs(past, out=past) < DOUBT_PX), past.shape[1])
     return np.stack([x, y], axis=-1)

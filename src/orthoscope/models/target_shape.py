@@ -16,7 +16,7 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, frozen, ndarray
 from orthoscope.geometry.pose import nearest_rotation
 
-__all__ = ["SHAPES", "TargetShape", "polynomials", "without_similarity"]
+__all__ = ["SHAPES", "WHOLE", "TargetShape", "polynomials", "without_similarity"]
 
 # The kinds of shape, from the stiffest to the softest.
 SHAPES = ("flat", "smooth", "free")
@@ -24,6 +24,9 @@ SHAPES = ("flat", "smooth", "free")
 SMOOTH_ORDERS = (1, 2, 3, 4)
 # A polynomial that differs from those before it by less than this share of its size is one of them.
 LEAST_DIFFERENCE = 1e-6
+
+# All corners as one body.
+WHOLE = (slice(None),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,31 +79,49 @@ class TargetShape:
 
 
 def without_similarity(
-    points: Float[ndarray, "m 3"], displacements: Float[ndarray, "m 3"], seen: ndarray
+    points: Float[ndarray, "m 3"],
+    displacements: Float[ndarray, "m 3"],
+    seen: ndarray,
+    *,
+    parts: Sequence[slice] = WHOLE,
 ) -> Float[ndarray, "m 3"]:
-    """The displacements once the whole is moved, turned and scaled to where it is nearest to nominal.
+    """The displacements once each part is moved, turned and scaled to where it is nearest to nominal.
 
     Args:
         points: the nominal ones, (m,3) metres.
         displacements: from nominal to real, (m,3) metres.
-        seen: (m,) bool, at least three corners off a line.
+        seen: (m,) bool, at least three corners off a line of each part that was seen.
+        parts: which corners are of one body; of several targets each has poses of its own.
     Returns:
         (m,3) metres; 0 for corners that were not seen.
     Source:
         S. Umeyama, Least-squares estimation of transformations, TPAMI 13(4), 1991.
     """
-    nominal, real = points[seen], points[seen] + displacements[seen]
-    centre = real.mean(0)
-    target, source = nominal - nominal.mean(0), real - centre
-    rotation = nearest_rotation(target.T @ source)
-    scale = np.vdot(target, source @ rotation.T) / np.vdot(source, source)
     settled = np.zeros_like(displacements)
-    settled[seen] = scale * source @ rotation.T - target
+    for part in parts:
+        mine = np.zeros(len(points), dtype=bool)
+        mine[part] = seen[part]
+        if mine.any():
+            settled[mine] = _without_similarity(points[mine], displacements[mine])
     return settled
 
 
+def _without_similarity(
+    points: Float[ndarray, "n 3"], displacements: Float[ndarray, "n 3"]
+) -> Float[ndarray, "n 3"]:
+    nominal, real = points, points + displacements
+    target, source = nominal - nominal.mean(0), real - real.mean(0)
+    rotation = nearest_rotation(target.T @ source)
+    scale = np.vdot(target, source @ rotation.T) / np.vdot(source, source)
+    return scale * source @ rotation.T - target
+
+
 def polynomials(
-    points: Float[ndarray, "m 3"], seen: ndarray, *, orders: Sequence[int] = SMOOTH_ORDERS
+    points: Float[ndarray, "m 3"],
+    seen: ndarray,
+    *,
+    orders: Sequence[int] = SMOOTH_ORDERS,
+    parts: Sequence[slice] = WHOLE,
 ) -> Float[ndarray, "m r"]:
     """Polynomials of the target's plane, orthogonal over the seen corners and of mean square 1 there.
 
@@ -108,9 +129,18 @@ def polynomials(
         points: the nominal ones, (m,3) metres.
         seen: (m,) bool.
         orders: which are wanted.
+        parts: which corners are of one body; of several targets each has polynomials of its own, 0 elsewhere.
     Returns:
         A column each, 0 at corners that were not seen; fewer where the seen corners cannot tell them apart.
     """
+    if len(parts) > 1:
+        found = []
+        for part in parts:
+            mine = np.zeros(len(points), dtype=bool)
+            mine[part] = seen[part]
+            if mine.any():
+                found.append(polynomials(points, mine, orders=orders))
+        return np.concatenate(found, axis=1)
     plane = points[:, :2] - points[seen, :2].mean(0)
     x, y = (plane / np.abs(plane[seen]).max()).T
     exponents = [(order - i, i) for order in range(max(orders) + 1) for i in range(order + 1)]

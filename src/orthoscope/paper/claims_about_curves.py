@@ -33,9 +33,12 @@ __all__ = [
     "same_on_test",
 ]
 
-SIMILAR = 0.25  # of the training error
-ACCURATE = 1.0  # NCE of rounding to whole pixels
-EXACT = 0.01  # NCE
+# A test error is similar that differs from the training error by no more than this share of it.
+SIMILAR_SHARE = 0.25
+# Rounding to whole pixels has this NCE.
+ACCURATE_NCE = 1.0
+# A calibration is as good as exact below this NCE.
+EXACT_NCE = 0.01
 
 
 class Axis(NamedTuple):
@@ -92,15 +95,14 @@ def compensated(where: str, curves: Curves, axis: Axis) -> Claim:
     told, (fccm,) = _both(curves, FCCM)
     ratio = fccm.noisy_test_nce / np.where(fccm.training_nce > 0, fccm.training_nce, np.nan)
     told = told & np.isfinite(ratio)
-    above, of = int((ratio > 1.0 + SIMILAR)[told].sum()), int(told.sum())
+    above, of = int((ratio > 1.0 + SIMILAR_SHARE)[told].sum()), int(told.sum())
     if not of:
         return Claim(where, paper, ClaimVerdict.OPEN, "FCCM gave no camera.")
     worst = int(np.nanargmax(np.where(told, ratio, np.nan)))
     finding = (
-        f"On test views as noisy as the training views FCCM's NCE is more than {100 * SIMILAR:.0f} % above"
-        " its training"
-        f" NCE at {above} of {of} {axis.levels}; where it compares worst, with"
-        f" {axis.at(fccm.levels[worst])}, it is"
+        "On test views as noisy as the training views FCCM's NCE is more than"
+        f" {100 * SIMILAR_SHARE:.0f} % above its training NCE at {above} of {of}"
+        f" {axis.levels}; where it compares worst, with {axis.at(fccm.levels[worst])}, it is"
         f" {short_number(fccm.noisy_test_nce[worst])} against {short_number(fccm.training_nce[worst])}."
     )
     return Claim(where, paper, share(above, of), finding + _true_poses(fccm) + _failed(fccm))
@@ -114,11 +116,11 @@ def same_on_test(where: str, curves: Curves, axis: Axis) -> Claim:
     if not told.any():
         return Claim(where, paper, ClaimVerdict.OPEN, "MLDC gave no camera.")
     ratio = mldc.noisy_test_nce[told] / mldc.training_nce[told]
-    similar, of = int((np.abs(ratio - 1.0) <= SIMILAR).sum()), len(ratio)
+    similar, of = int((np.abs(ratio - 1.0) <= SIMILAR_SHARE).sum()), len(ratio)
     finding = (
-        f"On test views as noisy as the training views MLDC's NCE is within {100 * SIMILAR:.0f} % of its"
-        " training NCE at"
-        f" {similar} of {of} {axis.levels} ({span(ratio)} times it); it is {span(mldc.noisy_test_nce[told])}."
+        "On test views as noisy as the training views MLDC's NCE is within"
+        f" {100 * SIMILAR_SHARE:.0f} % of its training NCE at {similar} of {of} {axis.levels}"
+        f" ({span(ratio)} times it); it is {span(mldc.noisy_test_nce[told])}."
     )
     return Claim(where, paper, share(similar, of), finding + _true_poses(mldc) + _failed(mldc))
 
@@ -196,10 +198,10 @@ def exact_without_noise(where: str, curves: Curves, axis: Axis) -> Claim:
     told = {curve.name: float(curve.test_nce[0]) for curve in three if np.isfinite(curve.test_nce[0])}
     if not told:
         return Claim(where, paper, ClaimVerdict.OPEN, "No method gave a camera.")
-    exact = [name for name, nce in told.items() if nce < EXACT]
+    exact = [name for name, nce in told.items() if nce < EXACT_NCE]
     finding = (
         f"With {axis.at(three[0].levels[0])} a view and no noise the test NCE is {each_of(told)}: "
-        f"below {EXACT:g} for {joined_words(exact) if exact else 'none of them'}."
+        f"below {EXACT_NCE:g} for {joined_words(exact) if exact else 'none of them'}."
     )
     return Claim(where, paper, share(len(exact), len(three)), finding + _failed(*three))
 
@@ -215,10 +217,10 @@ def accurate_from_three(where: str, curves: Curves, axis: Axis) -> Claim:
     if not enough.any():
         return Claim(where, paper, ClaimVerdict.OPEN, "MLDC gave no camera from three images or more.")
     nce, views = mldc.test_nce[enough], mldc.levels[enough]
-    accurate = int((nce < ACCURATE).sum())
+    accurate = int((nce < ACCURATE_NCE).sum())
     between = axis.at(views[0]) if len(views) == 1 else f"{views[0]:g} to {axis.at(views[-1])}"
     finding = (
-        f"With {between} MLDC's test NCE is {span(nce)}; it is below {ACCURATE:g}, what rounding to whole"
+        f"With {between} MLDC's test NCE is {span(nce)}; it is below {ACCURATE_NCE:g}, what rounding to whole"
         f" pixels gives, at {accurate} of {len(nce)} {axis.levels}."
     )
     return Claim(where, paper, share(accurate, len(nce)), finding + _failed(mldc))

@@ -12,10 +12,14 @@ from orthoscope.paper.wording import span
 
 __all__ = ["determined", "perfect", "weights_do_not_matter"]
 
-PERFECT = 1e-10  # px^2: J of eq. (7)
-SAME = 0.01  # px: cameras that differ by less are one camera
-ONE_PIXEL = 1.0  # of fx, fy, cx or cy: less does not count as a change
-ACCURATE = 1.0  # NCE of rounding to whole pixels
+# J of eq. (7) is as good as zero below this, px^2.
+PERFECT_COST = 1e-10
+# Cameras that differ by less, pixels, are one camera.
+SAME_PX = 0.01
+# A change of fx, fy, cx or cy by less, pixels, does not count as one.
+LEAST_CHANGE_PX = 1.0
+# Rounding to whole pixels has this NCE.
+ACCURATE_NCE = 1.0
 
 
 def perfect(where: str, members: Sequence[Eq7Search]) -> Claim:
@@ -24,9 +28,10 @@ def perfect(where: str, members: Sequence[Eq7Search]) -> Claim:
     costs = np.array([member.J for member in members if member.literal])
     if not len(costs):
         return Claim(where, paper, ClaimVerdict.OPEN, "Eq. (7) was not searched.")
-    ended = int((costs < PERFECT).sum())
+    ended = int((costs < PERFECT_COST).sum())
     finding = (
-        f"J ends below {PERFECT:g} in {ended} of {len(costs)} searches; its largest end is {costs.max():.0e}."
+        f"J ends below {PERFECT_COST:g} in {ended} of {len(costs)} searches;"
+        f" its largest end is {costs.max():.0e}."
     )
     return Claim(where, paper, share(ended, len(costs)), finding)
 
@@ -40,7 +45,7 @@ def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
     ends = [
         member.judgement
         for member in members
-        if member.literal and member.J < PERFECT and not member.judgement.failure
+        if member.literal and member.J < PERFECT_COST and not member.judgement.failure
     ]
     if len(ends) < 2:
         return Claim(where, paper, ClaimVerdict.OPEN, "Fewer than two searches ended at J = 0.")
@@ -51,17 +56,18 @@ def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
         for name, column in zip(("fx", "fy", "cx", "cy"), cameras.T, strict=True)
     )
     nce = np.array([end.test_nce for end in ends])
-    one = apart < SAME
+    one = apart < SAME_PX
     verdict = (
         ClaimVerdict.FAILS
         if not one
         else ClaimVerdict.HOLDS
-        if (nce < ACCURATE).all()
+        if (nce < ACCURATE_NCE).all()
         else ClaimVerdict.PARTLY
     )
     where_to = "one camera" if one else "different cameras"
     finding = (
-        f"{len(ends)} searches of the same data, all with J < {PERFECT:g}, end at {where_to}: {of_each} px, "
+        f"{len(ends)} searches of the same data, all with J < {PERFECT_COST:g}, end at {where_to}: {of_each}"
+        " px, "
         f"up to {apart:.2g} px apart; test NCE {span(nce)}."
     )
     return Claim(where, paper, verdict, finding)
@@ -81,7 +87,7 @@ def weights_do_not_matter(where: str, members: Sequence[Eq7Search]) -> Claim:
     each = ", ".join(
         f"{m.name.split('weights ')[1]}: {px:.2g} px" for m, px in zip(weighed, moved, strict=False)
     )
-    verdict = share(int((moved < ONE_PIXEL).sum()), len(moved))
+    verdict = share(int((moved < LEAST_CHANGE_PX).sum()), len(moved))
     return Claim(
         where, paper, verdict, f"Against weights 1 1 1 the camera moves, with J_PH, J_CR, J_ST at {each}."
     )

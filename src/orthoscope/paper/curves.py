@@ -22,10 +22,11 @@ class Curve:
     """A entry's mean errors at each level, ascending: NCE on training and on test data, and what they rest
     on.
 
-    test_error: standard error of test_nce, NaN with fewer than two trials. noisy_test_nce: on test views as
-        noisy as
-    the training views. true_pose_nce: with the true poses of the test views; NaN where no one knows them.
-    trials, failures: how many were made, and how many of them gave no camera.
+    Attributes:
+        test_error: standard error of test_nce, NaN with fewer than two trials.
+        noisy_test_nce: on test views as noisy as the training views.
+        true_pose_nce: with the true poses of the test views; NaN where no one knows them.
+        trials, failures: how many were made, and how many of them gave no camera.
     """
 
     name: str

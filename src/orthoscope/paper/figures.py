@@ -2,7 +2,7 @@
 
 Data in, Figure out, in the report's style. The paper's three are thick, with their standard error as a band;
 ours are thin, each with dashes and a marker of its own. Errors span from rounding noise to tens of pixels, so
-the axis is logarithmic, and linear below LINEAR.
+the axis is logarithmic, and linear below LINEAR_NCE.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, RED, SKY, n
 
 __all__ = ["nce_figure"]
 
-LINEAR = 0.01  # NCE; no one needs to see less than 0.004 px
+# The axis is linear below this NCE; no one needs to see less than 0.004 px.
+LINEAR_NCE = 0.01
 PAPER_LOOK = {FCCM: (BLUE, "o"), NMLDC: (ORANGE, "s"), MLDC: (RED, "^")}
 # Colour (the rest of Okabe and Ito's, and the paper's again for readings of its methods), dashes and marker
 # of ours.
@@ -34,17 +35,22 @@ OUR_LOOKS = (
     ("#009E73", (0, (3, 1, 1, 1)), ""),
     (INK, (0, (1, 1)), ""),
 )
-WIDTH = 7.4  # inches
-TEXT = 9.0  # points, the smallest
+# A figure has this width, inches.
+FIGURE_WIDTH = 7.4
+# The smallest text has so many points.
+TEXT_SIZE = 9.0
 
 
 @styled
 def nce_figure(curves: Curves, *, level: str, even: bool = False, height: float = 4.0) -> Figure:
     """Training and test NCE against the level.
 
-    level: the axis's words, with unit.  even: levels at equal distances, whatever they are.  height: inches.
+    Args:
+        level: the axis's words, with unit.
+        even: levels at equal distances, whatever they are.
+        height: inches.
     """
-    figure = Figure(figsize=(WIDTH, height))
+    figure = Figure(figsize=(FIGURE_WIDTH, height))
     left, right = figure.subplots(1, 2, sharey=True)
     levels = np.unique(np.concatenate([curve.levels for curve in curves.values()])) if curves else np.empty(0)
     ours = iter(OUR_LOOKS * (1 + len(curves) // len(OUR_LOOKS)))
@@ -53,9 +59,9 @@ def nce_figure(curves: Curves, *, level: str, even: bool = False, height: float 
         for name in curves
     }
     for axes, title, of in ((left, "training data", "training_nce"), (right, "test data", "test_nce")):
-        axes.set_title(title, loc="left", fontweight="bold", fontsize=TEXT)
-        axes.set_xlabel(level, fontsize=TEXT)
-        axes.tick_params(labelsize=TEXT)
+        axes.set_title(title, loc="left", fontweight="bold", fontsize=TEXT_SIZE)
+        axes.set_xlabel(level, fontsize=TEXT_SIZE)
+        axes.tick_params(labelsize=TEXT_SIZE)
         axes.grid()
         for name, curve in curves.items():
             _draw(axes, curve, getattr(curve, of), levels, *looks[name], even=even, band=of == "test_nce")
@@ -69,7 +75,7 @@ def nce_figure(curves: Curves, *, level: str, even: bool = False, height: float 
             *left.get_legend_handles_labels(),
             loc="outside upper left",
             ncols=4,
-            fontsize=TEXT,
+            fontsize=TEXT_SIZE,
             handlelength=2.2,
             columnspacing=1.4,
         )
@@ -108,16 +114,16 @@ def _draw(
 
 
 def _errors_axis(axes: Axes, curves: Curves) -> None:
-    """NCE upwards, logarithmic above LINEAR; a line where rounding to whole pixels is."""
+    """NCE upwards, logarithmic above LINEAR_NCE; a line where rounding to whole pixels is."""
     errors = np.concatenate(
         [np.concatenate([curve.training_nce, curve.test_nce]) for curve in curves.values()] or [np.empty(0)]
     )
     errors = errors[np.isfinite(errors)]
     highest = max(float(errors.max(initial=0.0)), 1.2)
-    axes.set_yscale("symlog", linthresh=LINEAR, linscale=0.6)
+    axes.set_yscale("symlog", linthresh=LINEAR_NCE, linscale=0.6)
     lowest = float(errors.min(initial=1.0))
-    axes.set_ylim(0.7 * lowest if lowest > LINEAR else 0.0, 1.5 * highest)
-    axes.set_ylabel("NCE", fontsize=TEXT)
+    axes.set_ylim(0.7 * lowest if lowest > LINEAR_NCE else 0.0, 1.5 * highest)
+    axes.set_ylabel("NCE", fontsize=TEXT_SIZE)
     steps = (
         (1.0, 2.0, 5.0) if lowest > 0.03 * highest else (1.0,)
     )  # numbers between the powers of ten where there are few of these
@@ -134,6 +140,6 @@ def _errors_axis(axes: Axes, curves: Curves) -> None:
             textcoords="offset points",
             ha="right",
             va="bottom",
-            fontsize=TEXT,
+            fontsize=TEXT_SIZE,
             color=GREY,
         )

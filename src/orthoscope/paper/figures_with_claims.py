@@ -18,7 +18,7 @@ from orthoscope.paper.curves import Curves, curves_of
 from orthoscope.paper.entries import MLDC, PAPER
 from orthoscope.paper.photographs import STUDY as PHOTOGRAPHS
 from orthoscope.paper.photographs import obliqueness
-from orthoscope.paper.section4 import PAPERS_NOISE, SCENES, Results
+from orthoscope.paper.section4 import PAPER_NOISE_PX, SCENES, Results
 from orthoscope.paper.trials import Outcome
 from orthoscope.paper.wording import each_of
 
@@ -36,7 +36,8 @@ __all__ = [
     "without_noise",
 ]
 
-STEADY = 2.0  # px: a distortion centre that changes by less from trial to trial is a stable one
+# A distortion centre that changes by less, pixels, from trial to trial is a stable one.
+STEADY_PX = 2.0
 
 NOISE = Axis("noise levels", "{:g} px of noise", column="noise_px", label="sigma (px)")
 POINTS = Axis("numbers of points", "{:g} points", column="points", label="points a view")
@@ -48,7 +49,8 @@ class Kind:
     """A figure before its numbers: what it shows of which study, the claims about it; then its file's name,
     the page's, and the scene.
 
-    even: levels at equal distances.
+    Attributes:
+        even: levels at equal distances.
     """
 
     study: str
@@ -153,20 +155,20 @@ FIG6 = Kind(
 
 
 def figures_with_claims(results: Results) -> list[FigureWithClaims]:
-    """The simulated figures, in the paper's order."""
-    return [_exhibit(kind, results.outcomes) for kind in EXHIBITS]
+    """The simulated figures that were run, in the paper's order."""
+    made = [_exhibit(kind, results.outcomes) for kind in EXHIBITS]
+    return [exhibit for exhibit in made if exhibit.curves]
 
 
 def on_photographs(results: Results) -> FigureWithClaims | None:
     """Fig. 6; None without photographs."""
-    return _exhibit(FIG6, results.on_photographs) if results.detections else None
+    return _exhibit(FIG6, results.on_photographs) if results.on_photographs else None
 
 
 def _exhibit(kind: Kind, outcomes: Sequence[Outcome]) -> FigureWithClaims:
     curves = curves_of(outcomes, study=kind.study, scene=kind.scene)
-    return FigureWithClaims(
-        kind, curves, tuple(judge(kind.where, curves, kind.axis) for judge in kind.judges)
-    )
+    judges = kind.judges if curves else ()
+    return FigureWithClaims(kind, curves, tuple(judge(kind.where, curves, kind.axis) for judge in judges))
 
 
 def without_noise(results: Results) -> tuple[Claim, ...]:
@@ -176,11 +178,14 @@ def without_noise(results: Results) -> tuple[Claim, ...]:
             f"Section 4.1, {scene}", curves_of(results.outcomes, study="exact", scene=scene), POINTS
         )
         for scene in SCENES
+        if results.plan.wants("exact", scene)
     )
 
 
 def eq7_claims(results: Results) -> tuple[Claim, ...]:
-    """What the paper says of eq. (7)."""
+    """What the paper says of eq. (7); nothing where it was not searched."""
+    if not results.members:
+        return ()
     of_scenes = (
         claims_about_eq7.determined(f"Eq. (8), {scene}", [m for m in results.members if m.scene == scene])
         for scene in SCENES
@@ -227,13 +232,15 @@ def stable_centre(results: Results) -> tuple[Claim, ...]:
     paper = "The method guarantees stability also when the distortion centre is computed."
     said = []
     for scene in SCENES:
+        if not results.plan.wants("points", scene):
+            continue
         of_scene = {centre.name: centre for centre in centres(results) if centre.scene == scene}
         where, mldc = f"Section 5, {scene}", of_scene.get(MLDC)
         spread = {name: max(centre.x[1], centre.y[1]) for name, centre in of_scene.items()}
         if mldc is None or not np.isfinite(spread[MLDC]):
             said.append(Claim(where, paper, ClaimVerdict.OPEN, "Fewer than two trials gave a centre."))
             continue
-        verdict = ClaimVerdict.HOLDS if spread[MLDC] < STEADY else ClaimVerdict.FAILS
+        verdict = ClaimVerdict.HOLDS if spread[MLDC] < STEADY_PX else ClaimVerdict.FAILS
         finding = (
             f"Over {mldc.trials} trials its centre is at ({mldc.x[0]:.1f}, {mldc.y[0]:.1f}) px; standard"
             " deviations of the"
@@ -249,7 +256,7 @@ def fair_finding(results: Results) -> str:
     return claims_about_curves.fair_chance(
         curves,
         level=float(max(columns * rows for columns, rows in results.plan.points)),
-        noise_px=PAPERS_NOISE,
+        noise_px=PAPER_NOISE_PX,
     )
 
 

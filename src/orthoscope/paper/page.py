@@ -7,12 +7,12 @@ knows how an experiment ends. The same results give the same bytes.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from orthoscope.geometry.numbers import ABSENT
+from orthoscope.geometry.numbers import ABSENT, fixed, with_error
 from orthoscope.methods import METHODS
 from orthoscope.paper.claims import Claim, ClaimVerdict, main_headline, of_sentence
 from orthoscope.paper.curves import curves_of
@@ -29,8 +29,8 @@ from orthoscope.paper.figures_with_claims import (
     stable_centre,
     without_noise,
 )
-from orthoscope.paper.photographs import SPLITS, Straightened
-from orthoscope.paper.section4 import PAPERS_NOISE, SCENES, Results
+from orthoscope.paper.photographs import SPLIT_COUNT, Straightened
+from orthoscope.paper.section4 import PAPER_NOISE_PX, SCENES, Results
 from orthoscope.paper.trials import TEST_VIEWS, TRAINING_VIEWS
 from orthoscope.version import __version__
 
@@ -39,8 +39,12 @@ if TYPE_CHECKING:
 
 __all__ = ["paper_page"]
 
+# The paper's gamma is told with so many decimals.
 GAMMA_DECIMALS = 3
-LEAST_HEIGHT, FOR_EACH_CLAIM = 2.6, 0.75  # inches: a figure is about as high as the claims beside it
+# A figure is at least this high, inches.
+LEAST_FIGURE_HEIGHT = 2.6
+# Each claim beside a figure makes it so much higher, inches, so that both are about as high.
+HEIGHT_PER_CLAIM = 0.75
 
 
 class Cell(NamedTuple):
@@ -63,8 +67,8 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         plan=results.plan,
         training_views=TRAINING_VIEWS,
         test_views=TEST_VIEWS,
-        splits=SPLITS,
-        noise=PAPERS_NOISE,
+        splits=SPLIT_COUNT,
+        noise=PAPER_NOISE_PX,
         headline=main_headline(every),
         every=every,
         summary=_summary(every),
@@ -116,7 +120,7 @@ def _figure(exhibit: FigureWithClaims) -> dict[str, Any]:
         exhibit.curves,
         level=kind.axis.label,
         even=kind.even,
-        height=LEAST_HEIGHT + FOR_EACH_CLAIM * len(exhibit.claims),
+        height=LEAST_FIGURE_HEIGHT + HEIGHT_PER_CLAIM * len(exhibit.claims),
     )
     return {
         "name": kind.name,
@@ -131,16 +135,16 @@ def _figure(exhibit: FigureWithClaims) -> dict[str, Any]:
 def _fig7(straightened: Straightened | None) -> dict[str, Any] | None:
     if straightened is None:
         return None
-    from orthoscope.report.pictures import LARGE, LARGE_BYTES, picture_uri
+    from orthoscope.report.pictures import BYTES_OF_LARGE, LARGE_WIDTH, picture_uri
 
     return {
         "name": straightened.name,
-        "photograph": picture_uri(straightened.photograph, LARGE, LARGE_BYTES),
+        "photograph": picture_uri(straightened.photograph, LARGE_WIDTH, BYTES_OF_LARGE),
         "pictures": [
             (
                 (name, None, picture)
                 if isinstance(picture, str)
-                else (name, picture_uri(picture, LARGE, LARGE_BYTES), "")
+                else (name, picture_uri(picture, LARGE_WIDTH, BYTES_OF_LARGE), "")
             )
             for name, picture in straightened.pictures
         ],
@@ -160,8 +164,8 @@ def _centres(results: Results) -> list[tuple[str, str, int, str, str]]:
     return [(c.scene, c.name, c.trials, _with_spread(c.x), _with_spread(c.y)) for c in centres(results)]
 
 
-def _with_spread(pair: tuple[float, float]) -> str:
-    return " ± ".join(_number(value, 2) for value in pair)
+def _with_spread(pair: tuple[float, float], decimals: int = 2) -> str:
+    return with_error(*pair, alone=partial(fixed, decimals=decimals))
 
 
 def _tone(verdict: ClaimVerdict) -> str:
@@ -194,7 +198,7 @@ def _members(results: Results) -> list[tuple[str, list[list[str]]]]:
                 [
                     (f"eq. (7), {m.name}" if m.literal else m.name),
                     f"{m.J:.0e}" if m.literal else ABSENT,
-                    *(_number(value, 1) for value in m.judgement[2:6]),
+                    *(fixed(value, 1) for value in m.judgement[2:6]),
                     _nce(m.judgement.test_nce),
                 ]
                 for m in results.members
@@ -208,7 +212,10 @@ def _members(results: Results) -> list[tuple[str, list[list[str]]]]:
 def _lenses(results: Results) -> list[tuple[str, str, list[Cell], str]]:
     """Every method with every lens: method, lens, training and test NCE in each scene, failures."""
     curves = {scene: curves_of(results.outcomes, study="lenses", scene=scene) for scene in SCENES}
+    if not all(curves.values()):
+        return []
     pairs = [(method, lens, f"{method} {lens}") for method in METHODS for lens in results.plan.lenses]
+    pairs = [pair for pair in pairs if pair[2] in curves[SCENES[0]]]
     columns = [(curves[scene], of) for scene in SCENES for of in ("training_nce", "test_nce")]
     values = np.array(
         [[float(getattr(of_scene[name], of)[0]) for of_scene, of in columns] for *_, name in pairs]
@@ -240,17 +247,13 @@ def _parameters(table: list[ParameterColumn]) -> list[tuple[str, list[str]]]:
         rows.append(
             (
                 label,
-                [" ± ".join(_number(value, decimals) for value in column.values[key]) for column in table],
+                [_with_spread(column.values[key], decimals) for column in table],
             )
         )
     rows.append(("Training error (NCE)", [_nce(column.training_nce) for column in table]))
     rows.append(("Testing error (NCE)", [_nce(column.test_nce) for column in table]))
     rows.append(("Splits without a camera", [str(column.failures) for column in table]))
     return rows
-
-
-def _number(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if np.isfinite(value) else ABSENT
 
 
 def _nce(value: float) -> str:

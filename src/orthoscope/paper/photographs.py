@@ -16,14 +16,14 @@ import numpy as np
 
 from orthoscope.files.images import read_image
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
-from orthoscope.paper.entries import OURS, PAPER, REPEATED, fair_peers, with_skew
+from orthoscope.paper.entries import OURS, PAPER, REPEATED, PaperEntry, with_skew
 from orthoscope.paper.subgrids import on_subgrid, subgrids
 from orthoscope.paper.trials import Outcome, Trial, trial_judged
 from orthoscope.straight.undistort import undistort
 from orthoscope.targets.detections import Detections
 
 __all__ = [
-    "SPLITS",
+    "SPLIT_COUNT",
     "STUDY",
     "Straightened",
     "check_views",
@@ -34,10 +34,12 @@ __all__ = [
     "straightened",
 ]
 
-SPLITS = 4  # 15 to compute and 5 to test of 20 is one in four
+# One photograph in so many is for testing, as the paper's 5 of 20.
+SPLIT_COUNT = 4
 STUDY = "photographs"
 REPEATED_ENTRY = next(entry for entry in OURS if entry.name == REPEATED)
-FEWEST_VIEWS = 8  # with fewer, a split tests on a single photograph
+# With fewer views a split tests on a single photograph.
+FEWEST_VIEWS = 8
 
 
 class Straightened(NamedTuple):
@@ -51,8 +53,10 @@ class Straightened(NamedTuple):
 
 
 def check_views(detections: Detections) -> None:
-    """Raises CalibrationError where there are too few photographs to compute from some and to test on
-    others.
+    """Check that there are enough photographs to compute from some and to test on others.
+
+    Raises:
+        CalibrationError: there are too few.
     """
     if len(detections.views) < FEWEST_VIEWS:
         raise CalibrationError(
@@ -68,12 +72,16 @@ def grids_of(detections: Detections, count: int) -> tuple[tuple[int, int] | None
 
 def split(detections: Detections, turn: int) -> tuple[Detections, Detections]:
     """Training and test photographs: every fourth is for testing, a different one each turn."""
-    tested = np.arange(len(detections.views)) % SPLITS == SPLITS - 1 - turn
+    tested = np.arange(len(detections.views)) % SPLIT_COUNT == SPLIT_COUNT - 1 - turn
     return detections.only(np.flatnonzero(~tested)), detections.only(np.flatnonzero(tested))
 
 
 def split_outcomes(
-    detections: Detections, turn: int, *, grids: tuple[tuple[int, int] | None, ...]
+    detections: Detections,
+    turn: int,
+    *,
+    grids: tuple[tuple[int, int] | None, ...],
+    entries: tuple[PaperEntry, ...],
 ) -> list[Outcome]:
     """Every entry on every sub-grid of the training photographs of a split; tested on all corners of the
     others.
@@ -89,7 +97,7 @@ def split_outcomes(
             trial_judged(entry, Trial(on_subgrid(training, grid), test, test)),
         )
         for grid in grids
-        for entry in with_skew((*PAPER, *fair_peers()))
+        for entry in with_skew(entries)
     ]
 
 

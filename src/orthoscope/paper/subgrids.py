@@ -18,7 +18,8 @@ from orthoscope.targets.target import Target
 
 __all__ = ["ids_of_subgrid", "on_subgrid", "subgrids"]
 
-FEWEST = 3  # corners along the shorter side; with two, a line is straight whatever the lens
+# The shorter side has at least this many corners; with two, a line is straight whatever the lens.
+FEWEST_CORNERS = 3
 
 
 def subgrids(grid: tuple[int, int], count: int) -> tuple[tuple[int, int], ...]:
@@ -27,7 +28,7 @@ def subgrids(grid: tuple[int, int], count: int) -> tuple[tuple[int, int], ...]:
     """
     shorter, longer = sorted(grid)
     sides = (
-        np.unique(np.geomspace(min(FEWEST, shorter), shorter, count).round().astype(int))
+        np.unique(np.geomspace(min(FEWEST_CORNERS, shorter), shorter, count).round().astype(int))
         if count > 1
         else np.array([shorter])
     )

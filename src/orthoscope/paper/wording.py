@@ -8,7 +8,8 @@ from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["each_of", "joined_words", "short_number", "span", "times"]
 
-DECIMALS = ((0.1, 3), (10.0, 2), (1e4, 0))  # below this size, so many
+# A number below each size has so many decimals.
+DECIMALS = ((0.1, 3), (10.0, 2), (1e4, 0))
 
 
 def short_number(value: float) -> str:

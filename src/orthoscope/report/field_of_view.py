@@ -15,7 +15,8 @@ from orthoscope.models.camera import Camera
 
 __all__ = ["FieldOfView", "field_of_view"]
 
-STEPS = 512
+# A line across the frame is followed in so many steps.
+LINE_STEPS = 512
 
 
 class FieldOfView(NamedTuple):
@@ -46,7 +47,7 @@ def field_of_view(camera: Camera) -> FieldOfView:
 
 def _swept(camera: Camera, start: tuple[float, float], end: tuple[float, float]) -> float:
     """The angle that the rays sweep from one pixel to another, radians."""
-    rays = camera.unproject(np.linspace(start, end, STEPS + 1))
+    rays = camera.unproject(np.linspace(start, end, LINE_STEPS + 1))
     steps = _angles(rays[:-1], rays[1:])
     return float(np.nansum(steps)) if np.isfinite(steps).any() else float("nan")
 

@@ -12,7 +12,8 @@ from orthoscope.evaluation.verdict.grades import Grade
 
 __all__ = ["Headline", "headline", "next_steps"]
 
-LOOKS = {  # of a grade: the class of its colours, and its sign
+# A grade has a class of colours and a sign.
+LOOKS = {
     Grade.GOOD: ("good", "\N{CHECK MARK}"),
     Grade.REGION: ("region", "\N{WHITE SQUARE}"),
     Grade.USABLE: ("usable", "\N{ALMOST EQUAL TO}"),
@@ -23,7 +24,7 @@ LOOKS = {  # of a grade: the class of its colours, and its sign
 class Headline(NamedTuple):
     """The verdict as the page opens with it.
 
-    Args:
+    Attributes:
         grade: a word or two.
         look: the class of its colours.
         sign: beside the word, for those who do not see the colour.

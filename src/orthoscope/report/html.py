@@ -12,7 +12,8 @@ from typing import Any
 
 __all__ = ["Content", "Html", "raw", "table", "tag"]
 
-ALONE = frozenset({"br", "img", "input", "meta", "wbr"})  # elements that hold nothing
+# These elements hold nothing.
+VOID_ELEMENTS = frozenset({"br", "img", "input", "meta", "wbr"})
 
 
 class Html(str):
@@ -42,7 +43,7 @@ def tag(name: str, /, *content: Content, **attributes: str | int | bool | None) 
         for key, value in attributes.items()
         if value is not None and value is not False
     )
-    return Html(f"<{name}{told}>" if name in ALONE else f"<{name}{told}>{_joined(content)}</{name}>")
+    return Html(f"<{name}{told}>" if name in VOID_ELEMENTS else f"<{name}{told}>{_joined(content)}</{name}>")
 
 
 def table(

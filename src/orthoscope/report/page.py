@@ -20,17 +20,18 @@ import msgspec
 from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.files.whole_files import write_text
 from orthoscope.report import sections
-from orthoscope.report.data.rounded import PLACE, RESIDUAL
+from orthoscope.report.data.rounded import PLACE_UNITS, RESIDUAL_UNITS
 from orthoscope.report.data.trust import trust
 from orthoscope.report.data.views import views
 from orthoscope.report.html import Html, raw, tag
 from orthoscope.report.panels import PANELS
 from orthoscope.report.pictures import Pictures
-from orthoscope.targets.left_out import LEFT_OUT
+from orthoscope.targets.left_out import LEFT_OUT_REASON
 
 __all__ = ["closed_page", "report_page", "write_report"]
 
-SCRIPT = (  # files in script/; the last begins
+# The page's script has these files of script/ as its parts; the last begins.
+SCRIPT_PARTS = (
     "data",
     "state",
     "plot",
@@ -64,11 +65,11 @@ def report_page(evaluation: Evaluation, *, pictures: Pictures | None = None) -> 
     width, height = detections.image_size
     data = {
         "frame": {"width": width, "height": height},
-        "units": {"place": PLACE, "residual": RESIDUAL},
+        "units": {"place": PLACE_UNITS, "residual": RESIDUAL_UNITS},
         "centre": [calibration.camera.intrinsics.cx, calibration.camera.intrinsics.cy],
         "columns": detections.target.grid and detections.target.grid[0],
         "views": views(evaluation),
-        "leftOut": [entry.image for entry in detections.set_aside if entry.reason == LEFT_OUT],
+        "leftOut": [entry.image for entry in detections.set_aside if entry.reason == LEFT_OUT_REASON],
         "large": pictures.large and pictures.large[0],
         "panels": {name: told for name, told in found.items() if not isinstance(told, str)},
     }
@@ -135,7 +136,7 @@ def closed_page(title: str, body: list[Html], *, data: Any = None, version: str,
 @cache
 def _script() -> str:
     """The one script: its parts in their order, of which each uses what stands before it."""
-    parts = "\n".join(_part(f"script/{name}.js") for name in SCRIPT)
+    parts = "\n".join(_part(f"script/{name}.js") for name in SCRIPT_PARTS)
     return f'"use strict";\n(() => {{\n{parts}}})();\n'
 
 

@@ -25,7 +25,7 @@ Data = dict[str, Any] | str
 class Panel(NamedTuple):
     """A figure of the page.
 
-    Args:
+    Attributes:
         name: in the script, and the element's id.
         title, caption: what it shows, and how to take it.
         label: what it shows, for readers who hear the page.

@@ -20,10 +20,16 @@ from orthoscope.geometry.arrays import InputError, ndarray
 
 __all__ = ["Pictures", "picture_uri", "pictures_of"]
 
-ALL_BYTES = 2_700_000  # of all small photographs together, before base64 adds a third
-EACH_BYTES = 36_000  # of one of them, however few there are
-SMALL, LARGE = 640, 1100  # pixels wide, at most
-LARGE_BYTES = 120_000  # of the one that is shown large, before and after
+# All small photographs together have at most so many bytes, before base64 adds a third.
+BYTES_OF_ALL = 2_700_000
+# One small photograph has at most so many bytes, however few there are.
+BYTES_OF_EACH = 36_000
+# A small photograph is at most so many pixels wide.
+SMALL_WIDTH = 640
+# A large photograph is at most so many pixels wide.
+LARGE_WIDTH = 1100
+# The photograph that is shown large, before and after, has at most so many bytes.
+BYTES_OF_LARGE = 120_000
 QUALITIES = (
     (1.0, 82),
     (1.0, 68),
@@ -39,7 +45,7 @@ QUALITIES = (
 class Pictures:
     """What is shown of photographs, as data URIs.
 
-    Args:
+    Attributes:
         small: by the view's name.
         large: the view's name, the photograph and the same without distortion; None where there is none.
     """
@@ -69,7 +75,7 @@ def pictures_of(
         return Pictures()
     from orthoscope.straight.undistort import before_and_after
 
-    most = int(min(EACH_BYTES, ALL_BYTES / len(names)))
+    most = int(min(BYTES_OF_EACH, BYTES_OF_ALL / len(names)))
     run = executor.map if executor else map
     small = {}
     shrink = partial(_small, size=calibration.camera.image_size, most=most)
@@ -84,7 +90,7 @@ def pictures_of(
     if shown is None:
         return Pictures(small)
     name, before, after = shown
-    taken, straight = (picture_uri(image, LARGE, LARGE_BYTES) for image in (before, after))
+    taken, straight = (picture_uri(image, LARGE_WIDTH, BYTES_OF_LARGE) for image in (before, after))
     return Pictures(small, (name, taken, straight))
 
 
@@ -128,4 +134,4 @@ def _small(path: Path, *, size: tuple[int, int], most: int) -> str | None:
         image = read_image(path, grey=False)
     except InputError:
         return None
-    return picture_uri(image, SMALL, most) if (image.shape[1], image.shape[0]) == tuple(size) else None
+    return picture_uri(image, SMALL_WIDTH, most) if (image.shape[1], image.shape[0]) == tuple(size) else None

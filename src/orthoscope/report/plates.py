@@ -22,7 +22,8 @@ class Plate:
     """One figure of the page: its name (also the prefix of its ids), title, caption, how it is drawn, and for
     which evaluations.
 
-    wide: spans both columns.
+    Attributes:
+        wide: spans both columns.
     """
 
     name: str

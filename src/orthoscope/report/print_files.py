@@ -43,8 +43,10 @@ def write_figures(evaluation: Evaluation, folder: str | Path) -> list[Path]:
 
 
 def check_matplotlib() -> None:
-    """Raises:
-    InputError: matplotlib is not installed.
+    """Check that matplotlib is there.
+
+    Raises:
+        InputError: it is not installed.
     """
     try:
         import matplotlib  # noqa: F401

@@ -19,14 +19,15 @@ from orthoscope.models.lenses import KannalaBrandt
 
 __all__ = ["Snippet", "snippets"]
 
-TOOLS = {"opencv": "OpenCV", "ros": "ROS"}  # of FORMATS, as they call themselves
+# These formats are shown under the tools' own names.
+TOOL_NAMES = {"opencv": "OpenCV", "ros": "ROS"}
 OWN = 'import orthoscope\n\ncamera = orthoscope.load_camera("calibration.json")\n'
 
 
 class Snippet(NamedTuple):
     """A text to copy.
 
-    Args:
+    Attributes:
         tool: whose it is.
         text: what to copy.
         remark: what it costs, or why there is none; may be empty.
@@ -40,7 +41,7 @@ class Snippet(NamedTuple):
 def snippets(calibration: Calibration) -> list[Snippet]:
     """For OpenCV, ROS and Python, in this order."""
     told, held = [], {}
-    for name, title in TOOLS.items():
+    for name, title in TOOL_NAMES.items():
         try:
             held[name] = exportable(calibration.camera, name, made_from=calibration)
             told.append(Snippet(title, _file(name, held[name].camera), _cost(held[name])))

@@ -19,7 +19,9 @@ from orthoscope.geometry.numbers import (
     pixels,
     probability,
     setting,
+    six_digits,
     value_with_deviation,
+    with_error,
 )
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
@@ -44,7 +46,8 @@ __all__ = [
     "warnings",
 ]
 
-ANGLES = ("tau_x", "tau_y", "w")  # coefficients in radians; all others have no unit
+# These coefficients are in radians; all others have no unit.
+ANGLE_NAMES = ("tau_x", "tau_y", "w")
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,8 @@ class MisfitRow:
     """A row of the table of misfits: of what, the part that views agree on and the part that they do not
     (px), F, F by chance, p-values.
 
-    moves: by how much the image of the camera is off for it, pixels, where that is known.
+    Attributes:
+        moves: by how much the image of the camera is off for it, pixels, where that is known.
     """
 
     what: str
@@ -161,7 +165,9 @@ def parameters(calibration: Calibration) -> list[Parameter]:
     unused = _unused(calibration)
     coefficients = zip(camera.lens.names(), camera.lens.coefficients.tolist(), strict=True)
     rows += [
-        (name, value, "rad" if name in ANGLES else "") for name, value in coefficients if name not in unused
+        (name, value, "rad" if name in ANGLE_NAMES else "")
+        for name, value in coefficients
+        if name not in unused
     ]
     deviations = calibration.uncertainty.deviations
     return [
@@ -172,12 +178,11 @@ def parameters(calibration: Calibration) -> list[Parameter]:
 
 def camera_line(calibration: Calibration) -> str:
     """Focal lengths and principal point with their standard deviations, one line."""
-    values = {row.name: row for row in parameters(calibration) if row.name in ("fx", "fy", "cx", "cy")}
-    told = (
-        f"{name} {row.value}" + ("" if row.deviation in (ABSENT, "fixed") else f" ± {row.deviation}")
-        for name, row in values.items()
+    K, deviations = calibration.camera.intrinsics, calibration.uncertainty.deviations
+    return " · ".join(
+        f"{name} {with_error(getattr(K, name), deviations.get(name, np.nan), alone=six_digits)}"
+        for name in ("fx", "fy", "cx", "cy")
     )
-    return " · ".join(told)
 
 
 def lens_rows(calibration: Calibration) -> list[tuple[str, str]]:

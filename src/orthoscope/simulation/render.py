@@ -12,7 +12,7 @@ levels. Grey is linear in light.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,17 +28,27 @@ from orthoscope.targets.target import Target, chessboard
 
 __all__ = ["Renderer", "demo_scene", "render", "rendered_photographs"]
 
-ROWS = 32  # rows drawn at once, so that intermediate arrays stay small
-BLACK, WHITE, BACKGROUND = 15.0, 200.0, 90.0  # grey levels before light, vignetting and noise
-WAVES, TEXTURE = 5, 40.0  # of the background: waves along each side of the image, grey levels of the longest
-MID_GREY = 128.0  # where `noise` is meant; half of its variance is read noise, half is shot noise
+# So many rows are drawn at once, so that intermediate arrays stay small.
+ROWS_AT_ONCE = 32
+# Black ink has this grey level, before light, vignetting and noise.
+BLACK_LEVEL = 15.0
+# White paper has this grey level, before light, vignetting and noise.
+WHITE_LEVEL = 200.0
+# The background has this grey level, before light, vignetting and noise.
+BACKGROUND_LEVEL = 90.0
+# The background has so many waves along each side of the image.
+WAVE_COUNT = 5
+# The longest of the background's waves has so many grey levels.
+TEXTURE_LEVELS = 40.0
+# `noise` is meant at this grey level; half of its variance is read noise, half is shot noise.
+MID_GREY_LEVEL = 128.0
 
 
 @dataclass(frozen=True, eq=False)
 class Renderer:
     """A camera ready to photograph: what is the same in every photograph is computed once.
 
-    Args:
+    Attributes:
         camera: which takes them.
         oversampling: sub-samples along a pixel's side where an edge crosses it.
         blur_px: sigma of the blur, pixels.
@@ -80,15 +90,29 @@ class Renderer:
         Raises:
             InputError: the target cannot be drawn.
         """
-        sheet = Sheet(target.drawing(), black=BLACK, white=WHITE)
+        return self.photograph_of([(target, camera_from_target)], rng=rng)
+
+    def photograph_of(
+        self, stands: Sequence[tuple[Target, Pose]], *, rng: np.random.Generator | None = None
+    ) -> ndarray:
+        """One photograph of several targets, (h,w) uint8.
+
+        Args:
+            stands: each target and camera_from_target, the one in front last.
+            rng: as in `photograph`.
+        Raises:
+            InputError: a target cannot be drawn.
+        """
         image = (
-            np.full(self._valid.shape, BACKGROUND, dtype=np.float32)
+            np.full(self._valid.shape, BACKGROUND_LEVEL, dtype=np.float32)
             if rng is None
             else self._surroundings(rng)
         )
-        plane_from_ray = _plane_from_ray(camera_from_target)
-        for start in range(0, len(image), ROWS):
-            self._draw(sheet, plane_from_ray, image, start)
+        for target, camera_from_target in stands:
+            sheet = Sheet(target.drawing(), black=BLACK_LEVEL, white=WHITE_LEVEL)
+            plane_from_ray = _plane_from_ray(camera_from_target)
+            for start in range(0, len(image), ROWS_AT_ONCE):
+                self._draw(sheet, plane_from_ray, image, start)
         if rng is not None:
             image *= self._lighting(rng)
         image *= self._valid
@@ -102,8 +126,8 @@ class Renderer:
         """The ray of each pixel; single precision is 6e-8 radians, far below a thousandth of a pixel."""
         width, height = self.camera.image_size
         rays = np.empty((3, height, width), dtype=np.float32)
-        for start in range(0, height, ROWS):
-            stop = min(start + ROWS, height)
+        for start in range(0, height, ROWS_AT_ONCE):
+            stop = min(start + ROWS_AT_ONCE, height)
             y, x = np.mgrid[start:stop, 0:width].astype(float).reshape(2, -1)
             rays[:, start:stop] = self.camera.unproject(np.stack([x, y], axis=-1)).T.reshape(
                 3, stop - start, width
@@ -132,14 +156,14 @@ class Renderer:
     def _surroundings(self, rng: np.random.Generator) -> Float[ndarray, "h w"]:
         """What is behind the board: a sum of cosines, the long ones strongest."""
         (x, y), (width, height) = self._grid(), self.camera.image_size
-        wave = np.arange(WAVES, dtype=np.float32)
+        wave = np.arange(WAVE_COUNT, dtype=np.float32)
         strength = (
-            TEXTURE
-            * rng.standard_normal((WAVES, WAVES), dtype=np.float32)
+            TEXTURE_LEVELS
+            * rng.standard_normal((WAVE_COUNT, WAVE_COUNT), dtype=np.float32)
             / (1.0 + wave[:, None] ** 2 + wave**2)
         )
         along_x, along_y = np.cos(np.pi * wave[:, None] * (x / width)), np.cos(np.pi * wave * (y / height))
-        return np.clip(BACKGROUND + along_y @ strength @ along_x, BLACK, WHITE)
+        return np.clip(BACKGROUND_LEVEL + along_y @ strength @ along_x, BLACK_LEVEL, WHITE_LEVEL)
 
     def _lighting(self, rng: np.random.Generator) -> Float[ndarray, "h w"]:
         """Light that is stronger on one side of the image, from a random direction; 1 in the middle."""
@@ -150,12 +174,12 @@ class Renderer:
         )
 
     def _noise(self, image: ndarray, rng: np.random.Generator) -> Float[ndarray, "h w"]:
-        sigma = self.noise * np.sqrt(0.5 + 0.5 * np.maximum(image, 0.0) / MID_GREY)
+        sigma = self.noise * np.sqrt(0.5 + 0.5 * np.maximum(image, 0.0) / MID_GREY_LEVEL)
         return sigma * rng.standard_normal(image.shape, dtype=np.float32)
 
     def _draw(self, sheet: Sheet, plane_from_ray: ndarray, image: ndarray, start: int) -> None:
         """Draw the sheet over ROWS rows of the image."""
-        stop, (height, width) = min(start + ROWS, len(image)), image.shape
+        stop, (height, width) = min(start + ROWS_AT_ONCE, len(image)), image.shape
         first = max(start - 1, 0)  # one row more on either side, for the slopes
         rays = self._rays[:, first : min(stop + 1, height)]
         plane = plane_from_ray @ rays.reshape(3, -1)

@@ -32,7 +32,10 @@ class Sheet:
 
     def __init__(self, drawing: Drawing, *, black: float, white: float) -> None:
         self._black, self._white = black, white
-        self._low, self._high, self._discs = drawing.low, drawing.high, drawing.discs
+        self._low, self._high = drawing.low, drawing.high
+        self._discs = [
+            (discs, sign) for discs, sign in ((drawing.discs, 1.0), (drawing.holes, -1.0)) if len(discs)
+        ]
         boxes = drawing.rectangles.reshape(-1, 2, 2)
         outline = np.stack([drawing.low, drawing.high])
         self._sides = [_distinct(np.concatenate([boxes[:, :, i].ravel(), outline[:, i]])) for i in (0, 1)]
@@ -67,9 +70,9 @@ class Sheet:
         black = self._cells[cells[0], cells[1]] * cover
         reach = 0.5 * np.abs(slopes).sum(1)  # a pixel's square reaches so far on the sheet
         crossed = self._crosses(place, reach, cells)
-        if len(self._discs):
-            black += self._in_discs(place[0], place[1], 1e-12)
-            crossed |= self._at_rim(place, np.hypot(*reach))
+        for discs, sign in self._discs:
+            black += sign * _in_discs(discs, place[0], place[1], 1e-12)
+            crossed |= np.abs(_from_rim(discs, *place)) <= np.hypot(*reach)
         which = np.flatnonzero(crossed)
         if len(which):
             offset = (np.arange(oversampling) + 0.5) / oversampling - 0.5
@@ -96,8 +99,8 @@ class Sheet:
         black = _inside(self._integral, x[1], y[1]) - _inside(self._integral, x[0], y[1])
         black += _inside(self._integral, x[0], y[0]) - _inside(self._integral, x[1], y[0])
         black /= width[0] * width[1]
-        if len(self._discs):
-            black += self._in_discs(place[0], place[1], np.sqrt(width[0] * width[1]))
+        for discs, sign in self._discs:
+            black += sign * _in_discs(discs, place[0], place[1], np.sqrt(width[0] * width[1]))
         on = [
             (np.clip(high[i], self._low[i], self._high[i]) - np.clip(low[i], self._low[i], self._high[i]))
             / width[i]
@@ -105,24 +108,23 @@ class Sheet:
         ]
         return on[0] * on[1], black
 
-    def _in_discs(self, x: ndarray, y: ndarray, width: ndarray | float) -> ndarray:
-        """Share of footprints inside a disc, their rims taken as straight."""
-        return np.clip(0.5 - self._from_rim(x, y) / width, 0.0, 1.0)
 
-    def _at_rim(self, place: ndarray, reach: ndarray) -> ndarray:
-        return np.abs(self._from_rim(*place)) <= reach
+def _in_discs(discs: Float[ndarray, "k 3"], x: ndarray, y: ndarray, width: ndarray | float) -> ndarray:
+    """Share of footprints inside a disc, their rims taken as straight."""
+    return np.clip(0.5 - _from_rim(discs, x, y) / width, 0.0, 1.0)
 
-    def _from_rim(self, x: ndarray, y: ndarray) -> ndarray:
-        """The distance to the nearest disc's rim, negative inside; infinite far from all."""
-        nearest = np.full(x.shape, np.inf)
-        if not x.size:
-            return nearest
-        centres, near = self._discs[:, :2], 2.0 * self._discs[:, 2]
-        low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
-        gap = np.maximum(np.maximum(low - centres, centres - high), 0.0).max(1)
-        for centre_x, centre_y, radius in self._discs[gap < near]:
-            np.minimum(nearest, np.hypot(x - centre_x, y - centre_y) - radius, out=nearest)
+
+def _from_rim(discs: Float[ndarray, "k 3"], x: ndarray, y: ndarray) -> ndarray:
+    """The distance to the nearest disc's rim, negative inside; infinite far from all."""
+    nearest = np.full(x.shape, np.inf)
+    if not x.size:
         return nearest
+    centres, near = discs[:, :2], 2.0 * discs[:, 2]
+    low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+    gap = np.maximum(np.maximum(low - centres, centres - high), 0.0).max(1)
+    for centre_x, centre_y, radius in discs[gap < near]:
+        np.minimum(nearest, np.hypot(x - centre_x, y - centre_y) - radius, out=nearest)
+    return nearest
 
 
 def _distinct(values: ndarray) -> Float[ndarray, " n"]:

@@ -38,8 +38,10 @@ __all__ = [
 
 Unknowns = TypeVar("Unknowns")
 
-# Damping stays within these two.
-LEAST_DAMPING, MOST_DAMPING = 1e-15, 1e12
+# Damping is at least this.
+LEAST_DAMPING = 1e-15
+# Damping is at most this.
+MOST_DAMPING = 1e12
 # An eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured there.
 LARGEST_OPEN_EIGENVALUE = 1e-14
 # An unknown that has at least this share (squared) in such a direction is open too.

@@ -1,9 +1,10 @@
 """Straight films: the frames of a video file as a pin-hole camera would have taken them.
 
 Frames are read and written here, in order, and mapped by an executor meanwhile, a few ahead, so that the
-cores are busy and memory does not grow with the film. A film is written beside its place and takes it when it
-is whole. Where PyAV is installed it is H.264 with its sound and its time stamps (film_av.py); otherwise
-OpenCV writes it, without sound, which OpenCV does not read.
+cores are busy and memory does not grow with the film. A mark that has players turn the film turns nothing
+here and is kept (files/sensor_frames.py). A film is written beside its place and takes it when it is whole.
+Where PyAV is installed it is H.264 with its sound and its time stamps (film_av.py); otherwise OpenCV writes
+it, without sound, which OpenCV does not read.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pathlib import Path
 
 import cv2
 
+from orthoscope.files.sensor_frames import mark_turned, open_film, quarter_turns
 from orthoscope.files.whole_files import check_not_onto
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.models.camera import Camera
@@ -34,8 +36,10 @@ CODECS = {
     ".mkv": "mp4v",
     ".avi": "MJPG",
 }  # what a film of that name is written with
-AHEAD = 6  # frames under way
-USUAL_RATE = 25.0  # frames a second of a film that does not say
+# So many frames are under way at most.
+FRAMES_AHEAD = 6
+# A film that does not say has so many frames a second.
+USUAL_RATE = 25.0
 
 
 def is_video(path: str | PathLike[str]) -> bool:
@@ -72,7 +76,8 @@ def undistort_video(
         return _with_pyav(straightener, path, place, executor=executor, progress=progress)
     with nullcontext(executor) if executor else ThreadPoolExecutor() as run, _Source(path) as source:
         rate, total = source.get(cv2.CAP_PROP_FPS), int(source.get(cv2.CAP_PROP_FRAME_COUNT))
-        with _Film(place, rate if 0 < rate < 1e4 else USUAL_RATE, straightener) as film:
+        usual = rate if 0 < rate < 1e4 else USUAL_RATE
+        with _Film(place, usual, straightener, quarters=quarter_turns(path)) as film:
             done = 0
             for done, frame in enumerate(_in_order(run, straightener, _frames(source)), 1):
                 film.write(frame)
@@ -104,6 +109,7 @@ def _with_pyav(
             raise InputError(
                 f"{path} has no frame that can be read; expected a film. Copy it again or convert it."
             )
+        mark_turned(part, quarter_turns(path), size=size)
         os.replace(part, place)
     finally:
         part.unlink(missing_ok=True)
@@ -113,7 +119,8 @@ def _with_pyav(
 def _part_of(place: Path) -> Path:
     """Where a film is written until it is whole; makes its folder.
 
-    Raises InputError where the name is no film's or the folder cannot be made.
+    Raises:
+        InputError: the name is no film's or the folder cannot be made.
     """
     suffix = place.suffix.lower()
     if suffix not in CODECS:
@@ -132,12 +139,12 @@ def _part_of(place: Path) -> Path:
 def _in_order(
     executor: Executor, step: Callable[[ndarray], ndarray], frames: Iterable[ndarray]
 ) -> Iterator[ndarray]:
-    """What `step` makes of each frame, in their order, with no more than AHEAD under way."""
+    """What `step` makes of each frame, in their order, with no more than FRAMES_AHEAD under way."""
     waiting: deque[Future[ndarray]] = deque()
     try:
         for frame in frames:
             waiting.append(executor.submit(step, frame))
-            if len(waiting) == AHEAD:
+            if len(waiting) == FRAMES_AHEAD:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
@@ -157,7 +164,7 @@ class _Source:
     def __init__(self, path: Path) -> None:
         if not path.is_file():
             raise InputError(f"{path} does not exist; expected a video file. Check the name and the folder.")
-        self.source = cv2.VideoCapture(str(path))
+        self.source = open_film(path)
         if not self.source.isOpened():
             raise InputError(
                 f"{path} is no film that can be read; expected one of {', '.join(CODECS)}. Convert it."
@@ -173,8 +180,9 @@ class _Source:
 class _Film:
     """A film that is open for writing within a block, and at its place after it, unless the block failed."""
 
-    def __init__(self, place: Path, rate: float, straightener: Straightener) -> None:
+    def __init__(self, place: Path, rate: float, straightener: Straightener, *, quarters: int) -> None:
         self.place, self.part = place, _part_of(place)
+        self.quarters, self.size = quarters, straightener.view.image_size
         code = cv2.VideoWriter_fourcc(*CODECS[place.suffix.lower()])  # pyright: ignore[reportAttributeAccessIssue]  its stubs have lost it
         self.film = cv2.VideoWriter(str(self.part), code, rate, straightener.view.image_size)
 
@@ -189,6 +197,7 @@ class _Film:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self.film.release()
         if kind is None:
+            mark_turned(self.part, self.quarters, size=self.size)
             os.replace(self.part, self.place)
         else:
             self.part.unlink(missing_ok=True)

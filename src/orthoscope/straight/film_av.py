@@ -17,8 +17,8 @@ from orthoscope.geometry.arrays import InputError, ndarray
 
 __all__ = ["has_pyav", "straighten_film"]
 
-# Frames under way.
-AHEAD = 6
+# So many frames are under way at most.
+FRAMES_AHEAD = 6
 # H.264's constant quality; 18 is taken for what no eye tells from the source.
 QUALITY = "18"
 
@@ -101,7 +101,7 @@ def _copy(
                 continue
             for frame in packet.decode():
                 waiting.append((frame, executor.submit(step, frame.to_ndarray(format="bgr24"))))
-                if len(waiting) == AHEAD:
+                if len(waiting) == FRAMES_AHEAD:
                     write_first()
         while waiting:
             write_first()

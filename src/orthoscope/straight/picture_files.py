@@ -26,13 +26,14 @@ __all__ = ["PictureFile", "encoded", "read_picture"]
 # Channels that cv2.remap maps at once, and depths that it knows.
 MOST_CHANNELS = 4
 DEPTHS = ("uint8", "uint16", "int16", "float32", "float64")
+# A JPEG is written with this quality.
 JPEG_QUALITY = 95
 
 
 class PictureFile(NamedTuple):
     """A picture and the file that it came in.
 
-    Args:
+    Attributes:
         pixels: (h,w) or (h,w,c), blue, green, red and perhaps alpha, in the file's own depth; as the sensor
             has them.
         content: the whole file.
@@ -206,9 +207,11 @@ TIFF_KEPT = (
 )
 TIFF_ORDERS = {b"II": "<", b"MM": ">"}
 TIFF_TABLES = (34665, 34853)
-INTEROPERABILITY = 40965  # a place in EXIF that leads to a third table, which nothing reads
+# This place in EXIF leads to a third table, which nothing reads.
+INTEROPERABILITY_TAG = 40965
 TIFF_BYTES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 13: 4}
-TIFF_UNITS = {3: 2, 4: 4, 5: 4, 8: 2, 9: 4, 10: 4, 11: 4, 12: 8, 13: 4}  # bytes that a byte order turns
+# A byte order turns so many bytes together in a value of each kind.
+TIFF_UNITS = {3: 2, 4: 4, 5: 4, 8: 2, 9: 4, 10: 4, 11: 4, 12: 8, 13: 4}
 
 
 class _Tag(NamedTuple):
@@ -228,7 +231,7 @@ def _tags(content: bytes, place: int, order: str, *, depth: int = 0) -> dict[int
         size = TIFF_BYTES.get(kind, 0) * length
         start = entry + 8 if size <= 4 else struct.unpack_from(order + "I", content, entry + 8)[0]
         data = content[start : start + size]
-        if not size or len(data) != size or tag == INTEROPERABILITY:
+        if not size or len(data) != size or tag == INTEROPERABILITY_TAG:
             continue
         table = None
         if tag in TIFF_TABLES and depth == 0:

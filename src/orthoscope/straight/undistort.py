@@ -31,7 +31,8 @@ from orthoscope.straight.views import View, map_of, straight_camera
 
 __all__ = ["Straightener", "before_and_after", "undistort", "undistort_photographs"]
 
-OUTSIDE = -10.0  # a place that is surely outside any photograph: remap paints it black
+# This place is surely outside any photograph: remap paints it black.
+OUTSIDE_PLACE = -10.0
 
 
 class _Spare(threading.local):
@@ -62,7 +63,7 @@ class Straightener:
         self.view: View = view or straight_camera(camera, keep=keep)
         self._spare = _Spare()
         self.maps: list[ndarray] = [
-            np.nan_to_num(part, copy=False, nan=OUTSIDE) for part in map_of(camera, self.view)
+            np.nan_to_num(part, copy=False, nan=OUTSIDE_PLACE) for part in map_of(camera, self.view)
         ]
 
     def __reduce__(self) -> tuple[Callable[[Camera], Straightener], tuple[Camera]]:
@@ -71,8 +72,10 @@ class Straightener:
     def __call__(self, image: ndarray, *, reuse: bool = False) -> ndarray:
         """The straight picture of a photograph (h,w) or (h,w,c), any depth, of the view's size.
 
-        reuse: where this thread's next picture may overwrite this one, whose memory then serves for all.
-        Raises InputError where the photograph is not of the camera's size.
+        Args:
+            reuse: where this thread's next picture may overwrite this one, whose memory then serves for all.
+        Raises:
+            InputError: the photograph is not of the camera's size.
         """
         size = (image.shape[1], image.shape[0])
         if size != tuple(self.camera.image_size):
@@ -176,7 +179,11 @@ def _straighten(straightener: Straightener, path: Path, place: Path) -> str | No
 
 
 def _check_names(photographs: list[Path]) -> None:
-    """Raises InputError where two photographs would be written to one file."""
+    """Check that each photograph would be written to a file of its own.
+
+    Raises:
+        InputError: two would be written to one.
+    """
     first: dict[str, Path] = {}
     for path in photographs:
         if path.name in first:

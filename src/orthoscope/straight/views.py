@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, ndarray
-from orthoscope.models.camera import WIDEST, Camera, Intrinsics, image_border
+from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics, image_border
 from orthoscope.models.lenses import Brown, KannalaBrandt, Stereographic
 from orthoscope.models.smooth_map import smooth_map
 
@@ -31,7 +31,7 @@ SHARE_GRID = (64, 48)
 class Panorama:
     """A camera whose picture is a part of a cylinder or of a sphere, unrolled.
 
-    Args:
+    Attributes:
         image_size: (width, height).
         intrinsics: pixels of a place, angle across and height up the cylinder or angle up the sphere.
         upright: whether it is a sphere's, with angles both ways.
@@ -66,7 +66,7 @@ View = Camera | Panorama
 class Projection(NamedTuple):
     """How rays are shown.
 
-    Args:
+    Attributes:
         view: the camera of a size and a pin-hole.
         farthest: the largest angle from the axis that is kept, radians, unless one asks for more.
     """
@@ -76,7 +76,7 @@ class Projection(NamedTuple):
 
 
 PROJECTIONS: dict[str, Projection] = {
-    "rectilinear": Projection(lambda size, pin_hole: Camera(size, pin_hole, Brown()), WIDEST),
+    "rectilinear": Projection(lambda size, pin_hole: Camera(size, pin_hole, Brown()), WIDEST_ANGLE),
     "equidistant": Projection(lambda size, pin_hole: Camera(size, pin_hole, KannalaBrandt()), np.pi),
     "stereographic": Projection(
         lambda size, pin_hole: Camera(size, pin_hole, Stereographic()), np.deg2rad(150.0)

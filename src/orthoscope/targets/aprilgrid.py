@@ -19,12 +19,24 @@ from orthoscope.targets.board import Board
 from orthoscope.targets.chessboard import parse_counts
 from orthoscope.targets.drawing import Drawing
 from orthoscope.targets.lengths import can_be_printed, length_text, parse_length
-from orthoscope.targets.markers import marker_modules, rectangles_of
+from orthoscope.targets.markers import (
+    check_numbers,
+    first_text,
+    marker_modules,
+    rectangles_of,
+    split_first,
+)
 
-__all__ = ["BORDER", "DICTIONARY", "TAG_SQUARES", "AprilGrid"]
+__all__ = ["BORDER_SQUARES", "DICTIONARY", "TAG_SQUARES", "AprilGrid"]
 
-DICTIONARY, TAGS = "DICT_APRILTAG_36h11", 587  # the family, and how many tags it has
-BORDER, TAG_SQUARES = 2, 10  # squares of a tag's border, and along its whole side
+# The tags are of this family.
+DICTIONARY = "DICT_APRILTAG_36h11"
+# The family has so many tags.
+TAG_COUNT = 587
+# A tag's border has so many squares.
+BORDER_SQUARES = 2
+# A tag has so many squares along its whole side.
+TAG_SQUARES = 10
 
 
 @dataclass(frozen=True)
@@ -36,7 +48,7 @@ class AprilGrid(Board):
     """
 
     kind = "aprilgrid"
-    form = "COLUMNSxROWS:TAG:SPACING"
+    form = "COLUMNSxROWS:TAG:SPACING[:first=NUMBER]"
     example = "aprilgrid:6x6:88mm:0.3"
     counted = "counting tags, the spacing as a share of a tag"
     advice = "Count its tags, and see that it is sharp and lit and its black corner squares are there"
@@ -45,29 +57,37 @@ class AprilGrid(Board):
     rows: int
     size: float
     spacing: float
+    first: int = 0
 
     def __post_init__(self) -> None:
-        tags = 0 < self.columns * self.rows <= TAGS
+        tags = 0 < self.columns * self.rows <= TAG_COUNT
         if not (tags and can_be_printed(self.columns, self.rows, self.size) and 0 < self.spacing <= 1):
             raise InputError(
                 f"an AprilGrid of {self.columns}x{self.rows} tags of {self.size:g} m with gaps of"
-                f" {self.spacing:g} of that cannot be used; expected 1 to {TAGS} tags and gaps above 0 up to"
-                f" 1, such as {self.example}."
+                f" {self.spacing:g} of that cannot be used; expected 1 to {TAG_COUNT} tags and gaps above 0"
+                f" up to 1, such as {self.example}."
             )
+        check_numbers(self.description, *self.markers)
 
     @classmethod
     def parse(cls, fields: Sequence[str]) -> Self:
-        if len(fields) != 3:
+        given, first = split_first(fields)
+        if len(given) != 3:
             raise cls.not_understood(":".join([cls.kind, *fields]))
         try:
-            spacing = float(fields[2])
+            spacing = float(given[2])
         except ValueError as error:
             raise cls.not_understood(":".join([cls.kind, *fields])) from error
-        return cls(*parse_counts(cls, fields[0]), parse_length(fields[1]), spacing)
+        return cls(*parse_counts(cls, given[0]), parse_length(given[1]), spacing, first)
 
     @property
     def description(self) -> str:
-        return f"{self.kind}:{self.columns}x{self.rows}:{length_text(self.size)}:{self.spacing:.10g}"
+        counts = f"{self.columns}x{self.rows}"
+        return f"{self.kind}:{counts}:{length_text(self.size)}:{self.spacing:.10g}{first_text(self.first)}"
+
+    @property
+    def markers(self) -> tuple[str, range]:
+        return DICTIONARY, range(self.first, self.first + self.columns * self.rows)
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -98,7 +118,7 @@ class AprilGrid(Board):
         gap = self.spacing * self.size
         points, shapes = self.points()[:, :2], []
         for number, (top_left, top_right, _, bottom_left) in enumerate(self.tag_corners()):
-            black = marker_modules(DICTIONARY, number, border=BORDER)
+            black = marker_modules(DICTIONARY, self.first + number, border=BORDER_SQUARES)
             black = np.rot90(black, 2)  # OpenCV prints these tags upside down
             shapes.append(np.tile(points[top_left], 2) + rectangles_of(black) * (self.size / len(black)))
             for corner, step in ((top_left, (-1, -1)), (top_right, (1, -1)), (bottom_left, (-1, 1))):

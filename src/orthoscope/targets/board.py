@@ -25,12 +25,13 @@ __all__ = ["Board"]
 class Board(ABC):
     """One kind of target.
 
-    Args:
+    Attributes:
         kind: the word that its descriptions begin with.
         form: what comes after it.
         example: a whole description.
         counted: what a person has to count, in a few words.
         advice: what to look at where no photograph shows it.
+        row_by_row: whether ids follow the lattice's rows.
     """
 
     kind: ClassVar[str]
@@ -38,6 +39,7 @@ class Board(ABC):
     example: ClassVar[str]
     counted: ClassVar[str]
     advice: ClassVar[str]
+    row_by_row: ClassVar[bool] = True
 
     @classmethod
     @abstractmethod
@@ -60,7 +62,7 @@ class Board(ABC):
 
     @abstractmethod
     def points(self) -> Float[ndarray, "m 3"]:
-        """Where the corners are: metres, target frame, z = 0, row by row."""
+        """Where the corners are: metres, target frame, z = 0, in the order of their ids."""
 
     @abstractmethod
     def drawing(self) -> Drawing:
@@ -72,6 +74,18 @@ class Board(ABC):
 
         Each is (m,): entry k is the id that corner k then has. No way where the board tells its ends apart.
         """
+
+    def mistaken_for(self, other: Board) -> bool:
+        """Whether a photograph of both boards may not tell which of them is which."""
+        mine, theirs = self.markers, other.markers
+        if mine and theirs:
+            return mine[0] == theirs[0] and not set(mine[1]).isdisjoint(theirs[1])
+        return self.kind == other.kind and sorted(self.grid) == sorted(other.grid)
+
+    @property
+    def markers(self) -> tuple[str, range] | None:
+        """The dictionary of its markers and their numbers in it; None where it has none."""
+        return None
 
     @property
     def disc_radius(self) -> float:

@@ -4,7 +4,7 @@ squares.
 OpenCV counts squares of these boards, of chessboards inner corners; so do we. Its boards begin with a black
 square at the top left; those of OpenCV before 4.6 (`:legacy` at the end) begin with a white one where the
 rows of squares are even. The corners are the same, only the markers lie elsewhere. Markers are numbered row
-by row, corners too.
+by row, from 0 where nothing else is said (`:first=17`), corners too.
 """
 
 from __future__ import annotations
@@ -20,7 +20,14 @@ from orthoscope.targets.board import Board
 from orthoscope.targets.chessboard import parse_counts, squares_of
 from orthoscope.targets.drawing import Drawing
 from orthoscope.targets.lengths import can_be_printed, length_text, parse_length
-from orthoscope.targets.markers import dictionary, marker_modules, modules_of, rectangles_of
+from orthoscope.targets.markers import (
+    check_numbers,
+    first_text,
+    marker_modules,
+    modules_of,
+    rectangles_of,
+    split_first,
+)
 
 __all__ = ["Charuco"]
 
@@ -36,7 +43,7 @@ class Charuco(Board):
     """
 
     kind = "charuco"
-    form = "COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:legacy]"
+    form = "COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:legacy][:first=NUMBER]"
     example = "charuco:7x5:30mm:22mm:DICT_5X5_100"
     counted = "counting squares"
     advice = "Count its squares, see which dictionary it was made with, and that it is sharp and lit"
@@ -47,6 +54,7 @@ class Charuco(Board):
     marker: float
     dictionary: str
     legacy: bool = False
+    first: int = 0
 
     def __post_init__(self) -> None:
         usable = can_be_printed(self.columns, self.rows, self.square) and 0 < self.marker < self.square
@@ -56,26 +64,31 @@ class Charuco(Board):
                 f" {self.marker:g} m cannot be used; expected at least 3x3 squares, and markers smaller than"
                 f" these, such as {self.example}."
             )
-        have, need = len(dictionary(self.dictionary).bytesList), len(self.marker_squares())
-        if need > have:
-            raise InputError(f"{self.description} needs {need} markers; {self.dictionary} has {have}.")
+        check_numbers(self.description, *self.markers)
 
     @classmethod
     def parse(cls, fields: Sequence[str]) -> Self:
-        if len(fields) not in (4, 5) or fields[4:] not in ([], [LEGACY]):
+        given, first = split_first(fields)
+        if len(given) not in (4, 5) or given[4:] not in ([], [LEGACY]):
             raise cls.not_understood(":".join([cls.kind, *fields]))
         return cls(
-            *parse_counts(cls, fields[0]),
-            parse_length(fields[1]),
-            parse_length(fields[2]),
-            fields[3].strip(),
-            len(fields) == 5,
+            *parse_counts(cls, given[0]),
+            parse_length(given[1]),
+            parse_length(given[2]),
+            given[3].strip(),
+            len(given) == 5,
+            first,
         )
 
     @property
     def description(self) -> str:
         sizes = f"{self.columns}x{self.rows}:{length_text(self.square)}:{length_text(self.marker)}"
-        return f"{self.kind}:{sizes}:{self.dictionary}" + (f":{LEGACY}" if self.legacy else "")
+        legacy = f":{LEGACY}" if self.legacy else ""
+        return f"{self.kind}:{sizes}:{self.dictionary}{legacy}{first_text(self.first)}"
+
+    @property
+    def markers(self) -> tuple[str, range]:
+        return self.dictionary, range(self.first, self.first + len(self.marker_squares()))
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -112,7 +125,7 @@ class Charuco(Board):
         module = (1.0 - 2.0 * self.arm) / modules_of(self.dictionary)
         shapes = [squares_of(self.columns, self.rows, first)]
         for number, square in enumerate(squares):
-            black = rectangles_of(marker_modules(self.dictionary, number))
+            black = rectangles_of(marker_modules(self.dictionary, self.first + number))
             shapes.append(np.tile(square + self.arm, 2) + module * black)
         low = np.array([-1.5, -1.5]) * self.square
         high = (np.array([self.columns, self.rows]) - 0.5) * self.square

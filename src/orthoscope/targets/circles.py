@@ -23,9 +23,12 @@ from orthoscope.targets.lengths import length_text, parse_length
 __all__ = ["Circles"]
 
 SYMMETRIC, ASYMMETRIC = "symmetric", "asymmetric"
-USUAL_DIAMETER = 0.4  # steps, as OpenCV's generator draws discs
-NEAREST = {SYMMETRIC: 1.0, ASYMMETRIC: np.sqrt(2.0)}  # steps from a disc to the next
-FEWEST = 6  # discs
+# OpenCV's generator draws discs with this share of a step as diameter.
+USUAL_DIAMETER_SHARE = 0.4
+# From a disc to the next it is so many steps.
+NEAREST_STEPS = {SYMMETRIC: 1.0, ASYMMETRIC: np.sqrt(2.0)}
+# A board has at least this many discs.
+FEWEST_DISCS = 6
 
 
 @dataclass(frozen=True)
@@ -49,30 +52,30 @@ class Circles(Board):
     diameter: float
 
     def __post_init__(self) -> None:
-        if self.layout not in NEAREST:
+        if self.layout not in NEAREST_STEPS:
             raise InputError(
-                f"a grid of circles is {self.layout!r}; expected {SYMMETRIC} or {ASYMMETRIC}, such as"
-                f" {self.example}."
+                f"a grid of circles is {self.layout!r}; expected {SYMMETRIC} or {ASYMMETRIC},"
+                f" such as {self.example}."
             )
-        few = min(self.columns, self.rows) < 2 or self.columns * self.rows < FEWEST
-        if few or not 0 < self.diameter < NEAREST[self.layout] * self.spacing < np.inf:
+        few = min(self.columns, self.rows) < 2 or self.columns * self.rows < FEWEST_DISCS
+        if few or not 0 < self.diameter < NEAREST_STEPS[self.layout] * self.spacing < np.inf:
             raise InputError(
                 f"a grid of {self.columns}x{self.rows} circles {self.spacing:g} m apart with diameters of"
-                f" {self.diameter:g} m cannot be used; expected at least {FEWEST} that do not touch, such as"
-                f" {self.example}."
+                f" {self.diameter:g} m cannot be used; expected at least {FEWEST_DISCS} that do not"
+                f" touch, such as {self.example}."
             )
 
     @classmethod
     def parse(cls, fields: Sequence[str]) -> Self:
-        if len(fields) not in (3, 4) or fields[2].strip() not in NEAREST:
+        if len(fields) not in (3, 4) or fields[2].strip() not in NEAREST_STEPS:
             raise cls.not_understood(":".join([cls.kind, *fields]))
         spacing = parse_length(fields[1])
-        diameter = parse_length(fields[3]) if len(fields) == 4 else USUAL_DIAMETER * spacing
+        diameter = parse_length(fields[3]) if len(fields) == 4 else USUAL_DIAMETER_SHARE * spacing
         return cls(*parse_counts(cls, fields[0]), spacing, fields[2].strip(), diameter)
 
     @property
     def description(self) -> str:
-        usual = length_text(USUAL_DIAMETER * self.spacing)
+        usual = length_text(USUAL_DIAMETER_SHARE * self.spacing)
         size = length_text(self.diameter)
         told = "" if size == usual else f":{size}"
         return f"{self.kind}:{self.columns}x{self.rows}:{length_text(self.spacing)}:{self.layout}{told}"

@@ -14,15 +14,29 @@ import numpy as np
 from orthoscope.geometry.arrays import InputError, frozen, ndarray
 from orthoscope.targets.target import Target
 
-__all__ = ["Detections", "Outlier", "SetAside", "View"]
+__all__ = ["Detections", "Outlier", "Remark", "SetAside", "View", "photograph_of", "view_name"]
+
+# What stands between a photograph's name and the number of the target, where it shows several.
+BOARD = ":board"
+
+
+def view_name(photograph: str, member: int) -> str:
+    """The name of what a photograph shows of one of several targets, numbered from 0 here, from 1 there."""
+    return f"{photograph}{BOARD}{member + 1}"
+
+
+def photograph_of(view: str) -> str:
+    """The name of the photograph that a view, of one of several targets perhaps, was found in."""
+    photograph, _, number = view.rpartition(BOARD)
+    return photograph if photograph and number.isdecimal() else view
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What was found in one photograph.
+    """What was found in one photograph; of several targets, each has a view of its own.
 
     Attributes:
-        image: the photograph's name.
+        image: the photograph's name, with the target's number where there are several (`view_name`).
         ids: (n,) distinct rows of the target's points.
         pixels: (n,2) where they were seen.
     Raises:
@@ -57,6 +71,18 @@ class SetAside(NamedTuple):
     reason: str
 
 
+class Remark(NamedTuple):
+    """What a person should know of how a photograph was seen, though it takes part.
+
+    Attributes:
+        image: the photograph's name.
+        words: a sentence without its full stop.
+    """
+
+    image: str
+    words: str
+
+
 class Outlier(NamedTuple):
     """A corner that was found but takes no part, and why.
 
@@ -75,17 +101,19 @@ class Outlier(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """One target seen by one camera in several photographs.
+    """One target, or several, seen by one camera in photographs.
 
     Attributes:
-        target: what was photographed.
+        target: what was photographed; a view of several shows one of its members.
         image_size: (width, height) pixels.
         views: what was found, photograph by photograph.
         set_aside: photographs without a view, with the reason.
         outliers: corners that were found and are in no view, with the reason.
         disc_centres: whether discs' pixels are where centres are seen, not the centres of outlines.
+        remarks: what to know of how photographs were seen.
     Raises:
-        InputError: a repeated image name, or a corner that the target does not have.
+        InputError: a repeated image name, a corner that the target does not have, or corners of two of its
+            members in one view.
     """
 
     target: Target
@@ -94,6 +122,7 @@ class Detections:
     set_aside: tuple[SetAside, ...] = ()
     outliers: tuple[Outlier, ...] = ()
     disc_centres: bool = False
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         width, height = (int(side) for side in self.image_size)
@@ -103,6 +132,7 @@ class Detections:
         object.__setattr__(self, "views", tuple(self.views))
         object.__setattr__(self, "set_aside", tuple(SetAside(*entry) for entry in self.set_aside))
         object.__setattr__(self, "outliers", tuple(Outlier(*entry) for entry in self.outliers))
+        object.__setattr__(self, "remarks", tuple(Remark(*entry) for entry in self.remarks))
         seen: set[str] = set()
         for view in self.views:
             if view.image in seen:
@@ -115,6 +145,11 @@ class Detections:
                     f"view {view.image!r} has corner {int(view.ids.max())}; target {self.target.name!r} has"
                     f" corners 0 to {len(self.target.points) - 1}. Name the target that was photographed."
                 )
+            if self.target.members and len(np.unique(self.member_of(view.ids))) > 1:
+                raise InputError(
+                    f"view {view.image!r} has corners of several targets; expected those of one. Make a view"
+                    " for each."
+                )
 
     def __repr__(self) -> str:
         width, height = self.image_size
@@ -126,6 +161,10 @@ class Detections:
     def corners(self) -> int:
         """How many corners were seen in all views together."""
         return sum(len(view.ids) for view in self.views)
+
+    def member_of(self, ids: ndarray) -> ndarray:
+        """Which of the target's members corners are of, from 0; all are of the first where it is one."""
+        return np.searchsorted([part.stop for part in self.target.parts], ids, side="right")
 
     def only(self, indices: Sequence[int] | ndarray) -> Detections:
         """The same, with the views of these indices and their outliers only (nothing is set aside by it)."""

@@ -1,4 +1,5 @@
-"""What is printed on a target's sheet: black rectangles and discs on white, in metres on the target's plane.
+"""What is printed on a target's sheet: black rectangles and discs on white, white discs in them,
+in metres on the target's plane.
 
 One drawing serves the renderer, which photographs it, and the printer, which writes it to a file.
 """
@@ -18,16 +19,18 @@ __all__ = ["Drawing"]
 class Drawing:
     """Black shapes on a white sheet, in the target's frame, x right and y down as printed.
 
-    Args:
+    Attributes:
         low, high: (2,) metres, opposite corners of the white sheet that the target needs.
         rectangles: (n,4) metres, x and y of one corner, then of the opposite one; they do not overlap.
         discs: (n,3) metres, x and y of the centre, radius; disjoint.
+        holes: (n,3) white discs inside black rectangles; as `discs`.
     """
 
     low: Float[ndarray, "2"]
     high: Float[ndarray, "2"]
     rectangles: Float[ndarray, "n 4"] = field(default_factory=lambda: np.zeros((0, 4)))
     discs: Float[ndarray, "k 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    holes: Float[ndarray, "h 3"] = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def size(self) -> Float[ndarray, "2"]:
@@ -41,4 +44,5 @@ class Drawing:
             self.high + step,
             self.rectangles + np.tile(step, 2),
             self.discs + np.array([*step, 0.0]),
+            self.holes + np.array([*step, 0.0]),
         )

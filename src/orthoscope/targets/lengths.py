@@ -9,15 +9,17 @@ from orthoscope.geometry.arrays import InputError
 __all__ = ["can_be_printed", "length_text", "parse_length"]
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
-# Metres; a board's squares are neither smaller than a wave of light nor larger than a town.
-SMALLEST, LARGEST = 1e-8, 1e4
+# A board's squares are no smaller than a wave of light, metres.
+SMALLEST_SQUARE = 1e-8
+# A board's squares are no larger than a town, metres.
+LARGEST_SQUARE = 1e4
 # Squares or tags of a board; a photograph shows fewer than a tenth of that.
 MOST_SQUARES = 100_000
 
 
 def can_be_printed(columns: int, rows: int, size: float) -> bool:
     """Whether a board of so many squares of this size (metres) can be meant."""
-    return columns * rows <= MOST_SQUARES and SMALLEST <= size <= LARGEST
+    return columns * rows <= MOST_SQUARES and SMALLEST_SQUARE <= size <= LARGEST_SQUARE
 
 
 def parse_length(text: str) -> float:

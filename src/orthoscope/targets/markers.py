@@ -6,6 +6,7 @@ one is drawn.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -13,7 +14,18 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 
-__all__ = ["dictionary", "marker_modules", "modules_of", "rectangles_of"]
+__all__ = [
+    "check_numbers",
+    "dictionary",
+    "first_text",
+    "marker_modules",
+    "modules_of",
+    "rectangles_of",
+    "split_first",
+]
+
+# What stands at the end of a description before the number of a board's first marker.
+FIRST = "first="
 
 
 @cache
@@ -62,3 +74,29 @@ def rectangles_of(black: ndarray) -> Float[ndarray, "n 4"]:
             for first, last in zip(*map(np.flatnonzero, (turns > 0, turns < 0)), strict=True)
         ]
     return np.array(found, dtype=float).reshape(-1, 4)
+
+
+def split_first(fields: Sequence[str]) -> tuple[list[str], int]:
+    """The fields of a description without `first=17` at its end, and that number; 0 where it is not said."""
+    last = fields[-1].strip() if fields else ""
+    if last.startswith(FIRST) and last.removeprefix(FIRST).isdecimal():
+        return list(fields[:-1]), int(last.removeprefix(FIRST))
+    return list(fields), 0
+
+
+def first_text(first: int) -> str:
+    """The end of a description that says with which number a board's markers begin; nothing where with 0."""
+    return f":{FIRST}{first}" if first else ""
+
+
+def check_numbers(description: str, name: str, numbers: range) -> None:
+    """Says where a dictionary has not all of a board's markers.
+
+    Raises:
+        InputError: it has not.
+    """
+    if (have := len(dictionary(name).bytesList)) < numbers.stop or numbers.start < 0:
+        raise InputError(
+            f"{description} needs markers {numbers.start} to {numbers.stop - 1}; {name} has 0 to {have - 1}."
+            " Take a larger dictionary or fewer markers."
+        )

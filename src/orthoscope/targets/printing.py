@@ -33,13 +33,22 @@ PAPERS = {
     "A1": (594.0, 841.0),
     "A0": (841.0, 1189.0),
 }
-MARGIN = 5.0  # mm that printers leave white
-STRIP = 12.0  # mm below the board, for ruler and description
-RULER, TICK = 100.0, 10.0  # mm, its length and its divisions
-LINE = 0.2  # mm, thickness of the ruler
-TEXT = 3.0  # mm, height of letters
-DOTS = 600.0  # an inch, of a PNG: a dot is 0.04 mm
-MOST_DOTS = 2e8  # of a PNG
+# Printers leave this much white.
+MARGIN_MM = 5.0
+# This much is left below the board, for ruler and description.
+STRIP_MM = 12.0
+# The ruler has this length.
+RULER_MM = 100.0
+# The ruler is divided by this.
+TICK_MM = 10.0
+# The ruler's lines have this thickness.
+LINE_MM = 0.2
+# Letters have this height.
+TEXT_MM = 3.0
+# A PNG has so many dots an inch: a dot is 0.04 mm.
+DOTS_PER_INCH = 600.0
+# A PNG has at most so many dots.
+MOST_DOTS = 2e8
 
 
 class Text(NamedTuple):
@@ -53,10 +62,11 @@ class Text(NamedTuple):
 class Page(NamedTuple):
     """A sheet of paper.
 
-    Args:
+    Attributes:
         width, height: mm.
         rectangles: (n,4) mm, x and y of one corner, then of the opposite one.
         discs: (k,3) mm, centre and radius.
+        holes: (h,3) mm, white ones inside rectangles.
         texts: what is written.
     """
 
@@ -64,6 +74,7 @@ class Page(NamedTuple):
     height: float
     rectangles: Float[ndarray, "n 4"]
     discs: Float[ndarray, "k 3"]
+    holes: Float[ndarray, "h 3"]
     texts: tuple[Text, ...]
 
 
@@ -83,14 +94,15 @@ def page_of(target: Target, *, paper: str | None = None) -> Page:
     black = np.concatenate(ends) * 1e3
     low, size = black.min(0), np.ptp(black, axis=0)
     width, height = _sheet(target.name, size, paper)
-    step = np.array([0.5 * (width - size[0]), 0.5 * (height - STRIP - size[1])]) - low
+    step = np.array([0.5 * (width - size[0]), 0.5 * (height - STRIP_MM - size[1])]) - low
     ruler, mark = _ruler(width, height)
-    words = Text(MARGIN + mark.x + 16.0, height - MARGIN - 1.0, target.name)
+    words = Text(MARGIN_MM + mark.x + 16.0, height - MARGIN_MM - 1.0, target.name)
     return Page(
         width,
         height,
         np.concatenate([drawing.rectangles * 1e3 + np.tile(step, 2), ruler]),
         drawing.discs * 1e3 + np.array([*step, 0.0]),
+        drawing.holes * 1e3 + np.array([*step, 0.0]),
         (mark, words),
     )
 
@@ -100,11 +112,11 @@ def _sheet(name: str, size: ndarray, paper: str | None) -> tuple[float, float]:
     papers = PAPERS if paper is None else {paper: _paper(paper)}
     for sides in papers.values():
         for width, height in (sides, sides[::-1]):
-            if size[0] + 2 * MARGIN <= width and size[1] + 2 * MARGIN + STRIP <= height:
+            if size[0] + 2 * MARGIN_MM <= width and size[1] + 2 * MARGIN_MM + STRIP_MM <= height:
                 return width, height
     raise InputError(
         f"target {name!r} is {size[0]:.0f} x {size[1]:.0f} mm and does not fit on {paper or list(PAPERS)[-1]}"
-        f" with a margin of {MARGIN:g} mm and a ruler. Choose larger paper or a smaller target."
+        f" with a margin of {MARGIN_MM:g} mm and a ruler. Choose larger paper or a smaller target."
     )
 
 
@@ -123,13 +135,13 @@ def _paper(text: str) -> tuple[float, float]:
 
 def _ruler(width: float, height: float) -> tuple[Float[ndarray, "n 4"], Text]:
     """A line with ticks at the bottom left, and its length."""
-    length = min(RULER, TICK * np.floor((width - 2 * MARGIN - 20.0) / TICK))
-    left, y = MARGIN + 1.0, height - MARGIN - 1.0
-    at = left + np.arange(0.0, length + 0.5 * TICK, TICK)
+    length = min(RULER_MM, TICK_MM * np.floor((width - 2 * MARGIN_MM - 20.0) / TICK_MM))
+    left, y = MARGIN_MM + 1.0, height - MARGIN_MM - 1.0
+    at = left + np.arange(0.0, length + 0.5 * TICK_MM, TICK_MM)
     ticks = np.stack(
-        [at - 0.5 * LINE, np.full_like(at, y - 3.0), at + 0.5 * LINE, np.full_like(at, y)], axis=1
+        [at - 0.5 * LINE_MM, np.full_like(at, y - 3.0), at + 0.5 * LINE_MM, np.full_like(at, y)], axis=1
     )
-    line = np.array([[left, y, left + length, y + LINE]])
+    line = np.array([[left, y, left + length, y + LINE_MM]])
     return np.concatenate([line, ticks]), Text(left + length + 2.0, y, f"{length:g} mm")
 
 
@@ -137,9 +149,13 @@ def svg(page: Page) -> bytes:
     """The page as SVG, its unit a millimetre."""
     boxes = page.rectangles
     path = "".join(f"M{_f(a)} {_f(b)}H{_f(c)}V{_f(d)}H{_f(a)}Z" for a, b, c, d in boxes)
-    discs = "".join(f'<circle cx="{_f(x)}" cy="{_f(y)}" r="{_f(r)}"/>' for x, y, r in page.discs)
+    discs = "".join(
+        f'<circle cx="{_f(x)}" cy="{_f(y)}" r="{_f(r)}"{fill}/>'
+        for some, fill in ((page.discs, ""), (page.holes, ' fill="#fff"'))
+        for x, y, r in some
+    )
     texts = "".join(
-        f'<text x="{_f(x)}" y="{_f(y)}" font-family="Helvetica, Arial, sans-serif" font-size="{TEXT:g}">'
+        f'<text x="{_f(x)}" y="{_f(y)}" font-family="Helvetica, Arial, sans-serif" font-size="{TEXT_MM:g}">'
         f"{escape(words)}</text>"
         for x, y, words in page.texts
     )
@@ -159,10 +175,11 @@ def pdf(page: Page) -> bytes:
     marks += [f"{_f(a)} {_f(b)} {_f(c - a)} {_f(d - b)} re" for a, b, c, d in page.rectangles]
     marks.append("f")
     marks += [_pdf_disc(*disc) for disc in page.discs]
+    marks += ["1 g", *(_pdf_disc(*disc) for disc in page.holes), "0 g"] if len(page.holes) else []
     for x, y, words in page.texts:
         plain = words.encode("latin-1", "replace").decode("latin-1")
         plain = re.sub(r"([\\()])", r"\\\1", plain)
-        marks.append(f"BT /F1 1 Tf {TEXT:g} 0 0 {-TEXT:g} {_f(x)} {_f(y)} Tm ({plain}) Tj ET")
+        marks.append(f"BT /F1 1 Tf {TEXT_MM:g} 0 0 {-TEXT_MM:g} {_f(x)} {_f(y)} Tm ({plain}) Tj ET")
     content = zlib.compress("\n".join(marks).encode("latin-1"))
     box = f"[0 0 {_f(page.width * point)} {_f(page.height * point)}]"
     objects = [
@@ -196,15 +213,18 @@ def _pdf_disc(x: float, y: float, r: float) -> str:
 
 
 def dxf(page: Page) -> bytes:
-    """The page as DXF R12: black rectangles as SOLID, discs as CIRCLE, millimetres, y upwards."""
+    """The page as DXF R12: black rectangles as SOLID, discs as CIRCLE (white ones on a layer `white`),
+    millimetres, y upwards.
+    """
     lines: list[object] = [0, "SECTION", 2, "ENTITIES"]
     for a, b, c, d in page.rectangles:
         top, bottom = page.height - b, page.height - d
         lines += [0, "SOLID", 8, "black"]
         for i, (x, y) in enumerate(((a, bottom), (c, bottom), (a, top), (c, top))):
             lines += [10 + i, _f(x), 20 + i, _f(y), 30 + i, "0"]
-    for x, y, r in page.discs:
-        lines += [0, "CIRCLE", 8, "black", 10, _f(x), 20, _f(page.height - y), 30, "0", 40, _f(r)]
+    layers = [("black", *disc) for disc in page.discs] + [("white", *disc) for disc in page.holes]
+    for layer, x, y, r in layers:
+        lines += [0, "CIRCLE", 8, layer, 10, _f(x), 20, _f(page.height - y), 30, "0", 40, _f(r)]
     for x, y, words in page.texts:
         lines += [
             0,
@@ -218,7 +238,7 @@ def dxf(page: Page) -> bytes:
             30,
             "0",
             40,
-            f"{TEXT:g}",
+            f"{TEXT_MM:g}",
             1,
             words,
         ]
@@ -230,18 +250,19 @@ def png(page: Page) -> bytes:
     """The page as PNG, black and white, with its resolution; coarser where the paper is large."""
     import cv2
 
-    dots = min(DOTS / 25.4, (MOST_DOTS / (page.width * page.height)) ** 0.5)  # a mm
+    dots = min(DOTS_PER_INCH / 25.4, (MOST_DOTS / (page.width * page.height)) ** 0.5)  # a mm
     picture = np.full((round(page.height * dots), round(page.width * dots)), 255, np.uint8)
     for a, b, c, d in np.rint(page.rectangles * dots).astype(int):
         picture[min(b, d) : max(b, d), min(a, c) : max(a, c)] = 0
-    for x, y, r in page.discs * dots:
+    rounds = [(0, disc) for disc in page.discs * dots] + [(255, disc) for disc in page.holes * dots]
+    for level, (x, y, r) in rounds:
         rows, columns = np.mgrid[int(y - r) - 1 : int(y + r) + 2, int(x - r) - 1 : int(x + r) + 2]
         inside = (rows + 0.5 - y) ** 2 + (columns + 0.5 - x) ** 2 <= r * r
-        picture[rows[inside], columns[inside]] = 0
+        picture[rows[inside], columns[inside]] = level
     for x, y, words in page.texts:
         place = (round(x * dots), round(y * dots))
         cv2.putText(
-            picture, words, place, cv2.FONT_HERSHEY_SIMPLEX, TEXT * dots / 22.0, 0, max(1, round(dots / 8))
+            picture, words, place, cv2.FONT_HERSHEY_SIMPLEX, TEXT_MM * dots / 22.0, 0, max(1, round(dots / 8))
         )
     height, width = picture.shape
     rows_ = np.pad(np.packbits(picture > 127, axis=1), ((0, 0), (1, 0)))  # a filter byte before each row

@@ -11,12 +11,16 @@ from orthoscope.targets.board import Board
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.circles import Circles
+from orthoscope.targets.grid_board import GridBoard
 from orthoscope.targets.kalibr_target import kalibr_target
-from orthoscope.targets.target import Target, target_of
+from orthoscope.targets.marked_chessboard import MarkedChessboard
+from orthoscope.targets.target import TOGETHER, Target, several, target_of
 
 __all__ = ["TARGETS", "as_fields", "forms", "parse_target"]
 
-TARGETS: dict[str, type[Board]] = {board.kind: board for board in (Chessboard, Charuco, AprilGrid, Circles)}
+TARGETS: dict[str, type[Board]] = {
+    board.kind: board for board in (Chessboard, MarkedChessboard, Charuco, AprilGrid, GridBoard, Circles)
+}
 
 
 def forms() -> str:
@@ -27,9 +31,13 @@ def forms() -> str:
 def parse_target(text: str) -> Target:
     """The target of a description such as `chessboard:9x6:25mm`, or of Kalibr's target.yaml.
 
+    Args:
+        text: the description; of several targets in the same photographs all, with ` + ` between them.
     Raises:
-        InputError: the description is none.
+        InputError: the description is none, or two targets could be taken for each other.
     """
+    if TOGETHER in text:
+        return several([parse_target(one) for one in text.split(TOGETHER)])
     if text.strip().lower().endswith((".yaml", ".yml")):
         return target_of(kalibr_target(text.strip()))
     kind, *fields = text.strip().split(":")

@@ -12,8 +12,14 @@ import pytest
 from orthoscope.cli.calibrate import calibrate
 from orthoscope.evaluation.verdict.advice import ADVICE, advice_on
 from orthoscope.evaluation.verdict.causes import CAUSES, listed
-from orthoscope.evaluation.verdict.grades import GRADES, WIDE, Grade, by_error, lower
-from orthoscope.evaluation.verdict.situation import FINE_PX, NOTHING_KNOWN, Situation, coarse_px
+from orthoscope.evaluation.verdict.grades import GRADES, WIDE_SHARE, Grade, by_error, lower
+from orthoscope.evaluation.verdict.situation import (
+    FINE_PX,
+    NEAR_PX,
+    NOTHING_KNOWN,
+    Situation,
+    coarse_px,
+)
 from orthoscope.evaluation.verdict.verdict import verdict_on
 
 NAN = float("nan")
@@ -25,6 +31,8 @@ FAULTS = {  # what can be wrong, each as the facts that say so
     "nothing known": {"error_px": NAN, "share": 0.0},
     "copies": {"views": 30, "distinct": 5, "error_px": 0.9, "share": 0.1},
     "far off": {"error_px": 7.0, "share": 0.0},
+    "far off, but not where the target was": {"error_px": 7.0, "near_px": 0.3, "share": 0.0},
+    "axis adrift": {"error_px": 2.0, "near_px": 0.3, "share": 0.1, "centre_sd": 0.4},
     "off": {"error_px": 1.0, "share": 0.1},
     "noisy": {"error_px": 0.9, "noise_px": 0.8, "share": 0.2},
     "frontal": {"error_px": 0.9, "tilt": 3.0, "share": 0.2},
@@ -35,7 +43,7 @@ FAULTS = {  # what can be wrong, each as the facts that say so
     "lens": {"lens_px": 0.2, "error_px": 0.7, "share": 0.2},
     "lens, little": {"lens_px": 0.05},
     "target": {"target_px": 0.2, "target_mm": 0.3, "error_px": 2.5, "share": 0.0},
-    "wild corners": {"wild": 40},
+    "wild corners": {"wild": 40, "wild_in": ("a.jpg", "b.jpg")},
     "zoom": {"disagree": "zoom", "differ_px": 1.5, "differ_focal": 0.01, "error_px": 1.6, "share": 0.1},
     "centre": {"disagree": "centre", "differ_px": 0.4, "differ_centre_px": 6.0, "error_px": 0.45},
     "shutter": {"disagree": "shutter", "differ_px": 0.5, "error_px": 0.4},
@@ -169,7 +177,29 @@ def test_a_camera_that_is_said_to_hold_is_off_by_little():
             assert s.error_px <= FINE_PX
             assert f"less than {FINE_PX:g} px over" in verdict.far
         if verdict.grade == Grade.GOOD:
-            assert s.share >= WIDE
+            assert s.share >= WIDE_SHARE
+
+
+def test_a_camera_that_is_open_far_away_still_serves_where_the_target_was():
+    far = Situation(error_px=7.0, share=0.0)
+    assert verdict_on(far).grade == Grade.NO
+    near = verdict_on(replace(far, near_px=0.3))
+    assert near.grade == Grade.USABLE
+    assert "off by about 0.3 px at the distances where the target was, by 7 px far away" in near.far
+    assert verdict_on(replace(far, near_px=NEAR_PX + 0.1)).grade == Grade.NO
+
+
+def test_what_a_shutter_did_is_in_the_error_and_the_camera_is_one():
+    verdict = verdict_on(Situation(**FAULTS["shutter"]))
+    assert (verdict.grade, verdict.cause) == (Grade.GOOD, "photographs")
+    assert "one camera" not in verdict.limit
+
+
+def test_a_method_that_forgives_wild_corners_is_judged_by_its_error_and_names_where_they_are():
+    wild = Situation(**FAULTS["wild corners"])
+    assert verdict_on(wild).grade == Grade.GOOD
+    assert "in a.jpg and b.jpg" in verdict_on(wild).limit
+    assert verdict_on(replace(wild, method="fccm")).grade == Grade.USABLE
 
 
 def test_nothing_known_is_not_to_be_used():

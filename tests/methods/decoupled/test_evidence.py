@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from helpers.bent_boards import bowed, drawn, photographed_with, stretched
 from helpers.scenes import BOARD, NARROW
 from orthoscope.methods.decoupled import evidence, step_one
-from orthoscope.methods.decoupled.evidence import LEAST, Evidence, first_guess
+from orthoscope.methods.decoupled.evidence import LEAST_SHARE, Evidence, first_guess
 from orthoscope.methods.decoupled.step_one import FORMULA, StepOneFit, fit_step_one
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.free_lens import FreeLens
@@ -57,12 +57,12 @@ def test_the_size_of_a_surface_is_found_apart_from_that_of_single_corners():
 
 @pytest.mark.parametrize("seed", [0, 4])
 def test_what_a_perfect_board_does_not_ask_for_runs_to_its_floor(monkeypatch, seed):
-    for name, value in {"ROUNDS": 60, "COARSE": 1e-9}.items():
+    for name, value in {"ROUND_LIMIT": 60, "ROUND_TOLERANCE": 1e-9}.items():
         monkeypatch.setattr(step_one, name, value)
-    monkeypatch.setattr(evidence, "SETTLED", 0.0)
+    monkeypatch.setattr(evidence, "SETTLED_SHARE", 0.0)
     fit = fitted(photographed_with(np.zeros_like(BOARD.points), NARROW, VIEWS, noise_px=NOISE, seed=seed))
     deviations = np.sqrt([*fit.evidence.surface, *fit.evidence.singles])
-    at_floor = deviations < 1.01 * LEAST * SIZE
+    at_floor = deviations < 1.01 * LEAST_SHARE * SIZE
     assert (
         at_floor.sum() >= 3
     )  # the likelihood of nothing is the greatest for about half of all groups; the others stay within noise

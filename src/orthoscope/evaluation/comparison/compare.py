@@ -5,7 +5,8 @@ user gave, without a fold; on the fold's views lens and target shape are fixed a
 chooses by itself it chooses anew in each fold, so the choice is judged too. Since the views are the same for
 all, what tells two entries apart is the difference from view to view: its standard error is mostly far below
 that of each error alone. Corners that do not belong (outliers.py) are left out once, for all: nobody can
-foresee a misread corner, and one would outweigh all that is compared.
+foresee a misread corner, and one would outweigh all that is compared. A camera from elsewhere stays as it is
+and has seen none of the views: it meets all of them with poses fitted.
 """
 
 from __future__ import annotations
@@ -19,14 +20,17 @@ from functools import partial
 import numpy as np
 
 from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
-from orthoscope.evaluation.metrics import held_out_nce
+from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
+from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.disc_centres import has_outlines
-from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views, held_out
+from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views, held_out, rms_and_error
+from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.methods import METHODS, calibrate
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.camera import Camera
+from orthoscope.models.lenses import lens_name
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
@@ -39,7 +43,7 @@ Progress = Callable[[int, int, str], None]
 class Standing:
     """How an entry did; NaN where it could not be judged, and `failure` says why.
 
-    Args:
+    Attributes:
         entry: the method with its settings.
         squares: (m,) of each view the sum of squared held-out residuals, px^2.
         camera, target_shape: calibrated from all views; None where they tell no camera.
@@ -182,8 +186,10 @@ def _distinct(entries: Sequence[Entry | str]) -> list[Entry]:
 
 
 def _calibrated(entry: Entry, used: Detections, clock: Callable[[], float]) -> Standing:
-    """The entry's calibration from all views."""
+    """The entry's calibration from all views; a camera that is given, as it is."""
     squares, begun = np.full(len(used.views), np.nan), clock()
+    if entry.camera is not None:
+        return _given(entry, entry.camera, used, squares)
     try:
         found = METHODS[entry.method](used, **entry.settings)
     except CalibrationError as error:
@@ -193,6 +199,31 @@ def _calibrated(entry: Entry, used: Detections, clock: Callable[[], float]) -> S
     lens = str(found.settings.get("lens", ""))
     came_to = Standing(entry, squares, found.camera, found.target_shape, lens)
     return replace(came_to, rms_px=found.rms_px, parameters=known, seconds=seconds)
+
+
+def _given(entry: Entry, camera: Camera, used: Detections, squares: Float[ndarray, " m"]) -> Standing:
+    """The standing of a camera from elsewhere, before it is judged."""
+    if tuple(camera.image_size) != tuple(used.image_size):
+        (width, height), (w, h) = camera.image_size, used.image_size
+        return Standing(
+            entry, squares, failure=f"it is a camera of {width}x{height} pixels; the photographs have {w}x{h}"
+        )
+    flat = TargetShape("flat", np.zeros_like(used.target.points))
+    return Standing(entry, squares, camera, flat, lens_name(camera.lens))
+
+
+def _with_poses_alone(standing: Standing, camera: Camera, used: Detections) -> Standing:
+    """The same judged: the camera fixed, the pose of each view fitted."""
+    try:
+        poses = resect(camera, used)
+    except CalibrationError as error:
+        return replace(standing, failure=str(error))
+    residuals = residuals_of(camera, poses, used)
+    squares = np.array([float((e * e).sum()) for e in residuals])
+    held_out_px, error_px = rms_and_error(squares, _corners(used))
+    estimated, observed = lateral_errors(camera, poses, used)
+    nce = normalised_calibration_error(estimated, observed, camera.intrinsics)
+    return replace(standing, squares=squares, held_out_px=held_out_px, error_px=error_px, nce=nce)
 
 
 def _judged(
@@ -207,6 +238,8 @@ def _judged(
     """
     if standing.camera is None:
         return standing
+    if standing.entry.camera is not None:
+        return _with_poses_alone(standing, standing.camera, used)
     refit = partial(METHODS[standing.entry.method], **standing.entry.settings)
     unseen = held_out(used, refit, folds=folds, executor=executor, progress=progress)
     squares = np.array([(e * e).sum() for e in unseen.residuals])

@@ -1,16 +1,17 @@
 """What follows from a comparison, in plain words.
 
-A difference counts where it is more than SURELY times its standard error; what is less, chance may account
-for.
+A difference counts where it is more than SURE_ERRORS times its standard error; what is less, chance may
+account for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isnan
 
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
 from orthoscope.geometry.numbers import with_error
-from orthoscope.methods.decoupled.model_selection import SURELY
+from orthoscope.methods.decoupled.model_selection import SURE_ERRORS
 
 __all__ = ["as_good_as_best", "conclusions"]
 
@@ -33,7 +34,7 @@ def conclusions(comparison: Comparison) -> tuple[str, ...]:
         told.append(_as_good(as_good))
     if worse:
         told.append(f"The next, {worse[0].entry.name}, loses {_loss(worse[0])} px.")
-    learnt = min(judged, key=lambda standing: standing.rms_px)
+    learnt = min(judged, key=lambda standing: (isnan(standing.rms_px), standing.rms_px))
     if learnt in worse:
         told.append(
             f"{learnt.entry.name} has the least error on photographs that were used, {learnt.rms_px:.3f} px,"
@@ -47,7 +48,7 @@ def as_good_as_best(comparison: Comparison) -> tuple[Standing, ...]:
     return tuple(
         standing
         for standing in comparison.judged[1:]
-        if standing.loses_px <= SURELY * standing.loses_error_px
+        if standing.loses_px <= SURE_ERRORS * standing.loses_error_px
     )
 
 

@@ -1,7 +1,7 @@
 """Who is compared, in the words of a user: a method, its lens, its settings.
 
 `METHOD`, `METHOD:LENS` with the lens as everywhere (`fccm:brown:k1,k2`), and any setting of the method's own
-by its name (`decoupled:shape=flat`, `fccm:rational:loss=huber`).
+by its name (`decoupled:shape=flat`, `fccm:rational:loss=huber`). A camera from elsewhere stays as it is.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 
 from orthoscope.geometry.arrays import InputError
 from orthoscope.methods import METHODS
+from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import parse_lens
 
-__all__ = ["USUAL", "Entry", "parse_entry"]
+__all__ = ["AS_IT_IS", "USUAL", "Entry", "camera_entry", "parse_entry"]
 
 USUAL = (
     *METHODS,
@@ -22,16 +23,32 @@ USUAL = (
     "decoupled:shape=flat",
     "fccm:rational",
 )  # fccm alone: brown, or kannala_brandt if wide
-CHOSEN = ("auto", "free")  # lenses that are in no table
+# These lenses are in no table.
+LENSES_IN_NO_TABLE = ("auto", "free")
 TRUTHS = {"true": True, "yes": True, "false": False, "no": False}
 
 
+# What stands for a method where a camera is given, and none is made.
+AS_IT_IS = "as it is"
+
+
 class Entry(NamedTuple):
-    """A method with its settings, under the name that a user gave it."""
+    """A method with its settings, under the name that a user gave it; or a camera that is given."""
 
     name: str
     method: str
     settings: Mapping[str, Any]
+    camera: Camera | None = None
+
+
+def camera_entry(name: str, camera: Camera) -> Entry:
+    """The entry of a camera from elsewhere, which stays as it is: each view's pose alone is fitted.
+
+    Args:
+        name: that it is shown by, such as its file's.
+        camera: of the photographs' size.
+    """
+    return Entry(name, AS_IT_IS, {}, camera)
 
 
 def parse_entry(text: str) -> Entry:
@@ -44,8 +61,8 @@ def parse_entry(text: str) -> Entry:
     """
     if "." in text.split(":")[0]:
         raise InputError(
-            f"{text!r} is no method; a comparison makes every camera anew. To see how a camera of a file does"
-            f" on photographs, say orthoscope evaluate {text} --on PHOTOS --target chessboard:9x6:25mm."
+            f"{text!r} is neither a method nor a file that is there; expected a camera's file, or one of"
+            f" {', '.join(METHODS)}."
         )
     method, *parts = (part.strip() for part in text.strip().split(":"))
     if method not in METHODS:
@@ -54,7 +71,7 @@ def parse_entry(text: str) -> Entry:
             " fccm:brown."
         )
     lens = ":".join(part for part in parts if "=" not in part)
-    if lens and lens not in CHOSEN:
+    if lens and lens not in LENSES_IN_NO_TABLE:
         parse_lens(lens)
     settings: dict[str, Any] = {"lens": lens} if lens else {}
     known = _settings_of(method)

@@ -18,7 +18,9 @@ from orthoscope.geometry.arrays import Float, Int, ndarray
 
 __all__ = ["Block", "Columns"]
 
-OPEN = 1e-14  # of a pose: what a view with hardly any corners does not tell
+# An eigenvalue of a pose's scaled system that is no larger is what a view with hardly any corners does not
+# tell.
+LARGEST_OPEN_EIGENVALUE = 1e-14
 
 
 class Block(NamedTuple):
@@ -158,8 +160,10 @@ def _orthonormal(
     gram = _sums(by_pose, by_pose, view, views).transpose(2, 0, 1)
     scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=1, axis2=2), 1e-300))
     values, vectors = np.linalg.eigh(gram / (scale[:, :, None] * scale[:, None, :]))
-    told = values > OPEN
+    told = values > LARGEST_OPEN_EIGENVALUE
     to_basis = (
-        vectors / scale[:, :, None] * np.where(told, 1.0 / np.sqrt(np.maximum(values, OPEN)), 0.0)[:, None, :]
+        vectors
+        / scale[:, :, None]
+        * np.where(told, 1.0 / np.sqrt(np.maximum(values, LARGEST_OPEN_EIGENVALUE)), 0.0)[:, None, :]
     )
     return to_basis, int(told.sum())

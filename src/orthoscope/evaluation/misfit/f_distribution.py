@@ -12,8 +12,10 @@ import math
 
 __all__ = ["f_survival"]
 
-SMALLEST = 1e-300  # instead of 0, which a continued fraction may meet on its way
-TERMS = 10_000  # it needs about the root of the larger argument
+# This stands instead of a 0, which a continued fraction may meet on its way.
+SMALLEST_NUMBER = 1e-300
+# The fraction has at most so many terms; it needs about the root of the larger argument.
+MOST_TERMS = 10_000
 
 
 def f_survival(f: float, a: float, b: float) -> float:
@@ -37,14 +39,14 @@ def _beta(x: float, p: float, q: float) -> float:
 
 def _fraction(x: float, p: float, q: float) -> float:
     """The continued fraction 1 / (1 + d_1 / (1 + d_2 / (1 + ...))), two terms at a time."""
-    c, d = 1.0, 1.0 / (1.0 - (p + q) * x / (p + 1.0) or SMALLEST)
+    c, d = 1.0, 1.0 / (1.0 - (p + q) * x / (p + 1.0) or SMALLEST_NUMBER)
     value = d
-    for m in range(1, TERMS):
+    for m in range(1, MOST_TERMS):
         even = m * (q - m) * x / ((p + 2 * m - 1) * (p + 2 * m))
         odd = -(p + m) * (p + q + m) * x / ((p + 2 * m) * (p + 2 * m + 1))
         for term in (even, odd):
-            d = 1.0 / (1.0 + term * d or SMALLEST)
-            c = 1.0 + term / c or SMALLEST
+            d = 1.0 / (1.0 + term * d or SMALLEST_NUMBER)
+            c = 1.0 + term / c or SMALLEST_NUMBER
             value *= c * d
         if abs(c * d - 1.0) < 1e-15:
             break

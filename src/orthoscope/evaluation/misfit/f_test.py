@@ -14,30 +14,40 @@ import numpy as np
 
 from orthoscope.evaluation.misfit.design_matrix import Columns
 from orthoscope.evaluation.misfit.f_distribution import f_survival
-from orthoscope.evaluation.misfit.whitening import FAINT, Whitening
+from orthoscope.evaluation.misfit.whitening import FAINT_SHARE, Whitening
 from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["Agreement", "MisfitTest", "agreement", "is_misfit"]
 
-SURE = (
-    0.01  # p-value of a misfit: one perfect set in a hundred is blamed for its target, and one for its lens
-)
-SURE_OVER_VIEWS = 0.05  # or, with too few views to get there, the least p-value that they can give
-TELLING = 0.25  # of the noise: a misfit that is smaller adds less than a thirtieth to the error
-NEGLIGIBLE = 0.01  # px: no misfit that is smaller matters to anyone
-FEWEST_VIEWS = 3  # with fewer, "the same in all views" means nothing
-FEWEST_WITHIN = 10  # degrees of freedom left for the noise
-ALL_SIGNS = 11  # views up to which every combination of signs is tried; with more, as many at random
+# With this p-value of a misfit one perfect set in a hundred is blamed for its target, and one for its lens.
+SURE_P_VALUE = 0.01
+# The p-value over views is at most this or, with too few views to get there, the least that they can give.
+SURE_P_VALUE_OVER_VIEWS = 0.05
+# A misfit that is smaller than this share of the noise adds less than a thirtieth to the error.
+TELLING_SHARE = 0.25
+# No misfit that is smaller, pixels, matters to anyone.
+NEGLIGIBLE_PX = 0.01
+# With fewer views "the same in all views" means nothing.
+FEWEST_VIEWS = 3
+# At least so many degrees of freedom are left for the noise.
+FEWEST_DEGREES_WITHIN = 10
+# Up to so many views every combination of signs is tried; with more, as many at random.
+ALL_SIGNS_VIEWS = 11
 
 
 @dataclass(frozen=True)
 class MisfitTest:
     """Whether residuals agree from view to view, and by how much.
 
-    f, between, within: F and its degrees of freedom; chance: the F that these residuals have without any
-    agreement between views. p_value: of F for independent normal noise; p_over_views: for any noise that
-    differs from view to view. systematic_px: the part that agrees, noise_px: the part that does not, both rms
-    per point. NaN where the views do not suffice for a test.
+    NaN where the views do not suffice for a test.
+
+    Attributes:
+        f, between, within: F and its degrees of freedom.
+        chance: the F that these residuals have without any agreement between views.
+        p_value: of F for independent normal noise.
+        p_over_views: for any noise that differs from view to view.
+        systematic_px: the part that agrees, rms per point.
+        noise_px: the part that does not, rms per point.
     """
 
     f: float
@@ -52,8 +62,10 @@ class MisfitTest:
 
 def is_misfit(test: MisfitTest, views: int) -> bool:
     """Whether a misfit is certain, by the F test and by the vote of the views, and large enough to matter."""
-    certain = test.p_value < SURE and test.p_over_views <= max(SURE_OVER_VIEWS, 2.0 ** (1 - views))
-    return certain and test.systematic_px > max(TELLING * test.noise_px, NEGLIGIBLE)
+    certain = test.p_value < SURE_P_VALUE and test.p_over_views <= max(
+        SURE_P_VALUE_OVER_VIEWS, 2.0 ** (1 - views)
+    )
+    return certain and test.systematic_px > max(TELLING_SHARE * test.noise_px, NEGLIGIBLE_PX)
 
 
 class Agreement(NamedTuple):
@@ -69,7 +81,9 @@ def agreement(columns: Columns, whole: Whitening, tested: tuple[int, ...]) -> Ag
     """Test blocks of columns with the other blocks, and the poses, granted; NaN, and unknowns 0, where the
     views do not suffice.
 
-    whole: of all the columns' gram matrix.  tested: numbers of the blocks, side by side.
+    Args:
+        whole: of all the columns' gram matrix.
+        tested: numbers of the blocks, side by side.
     """
     granted = [i for i in range(len(columns.blocks)) if i not in tested]
     A, B = (np.concatenate([columns.places[i] for i in blocks]) for blocks in (granted, tested))
@@ -81,7 +95,7 @@ def agreement(columns: Columns, whole: Whitening, tested: tuple[int, ...]) -> Ag
     of_all, of_A = scores @ whole.white.T, scores[:, A] @ white_A.T
     rank_A, rank_B = _rank(white_A), _rank(whole.white[:, B])
     within = 2 * len(left) - columns.poses_rank - rank_A - rank_B
-    if columns.views < FEWEST_VIEWS or within < FEWEST_WITHIN or rank_B < 1:
+    if columns.views < FEWEST_VIEWS or within < FEWEST_DEGREES_WITHIN or rank_B < 1:
         return Agreement(MisfitTest(*[float("nan")] * 8), np.zeros(len(B)))
     by_A = of_A @ of_A.T
     test = _voted(
@@ -141,29 +155,29 @@ def _shrunk(
     """The unknowns as normal numbers would be expected whose spread makes the systematic part, seen through
     the noise.
 
-    gram (overwritten), score: of the columns, the granted ones eliminated, scaled to length 1 with FAINT
-    added; lengths: before that.
+    gram (overwritten), score: of the columns, the granted ones eliminated, scaled to length 1 with
+    FAINT_SHARE added; lengths: before that.
     """
     squares = lengths * lengths
-    spread = test.systematic_px**2 * corners / (squares @ (gram.diagonal() - FAINT))
+    spread = test.systematic_px**2 * corners / (squares @ (gram.diagonal() - FAINT_SHARE))
     noise = 0.5 * max(test.chance, 1.0) * test.noise_px**2 / spread
-    np.fill_diagonal(gram, gram.diagonal() - FAINT + noise / squares)
+    np.fill_diagonal(gram, gram.diagonal() - FAINT_SHARE + noise / squares)
     return np.linalg.solve(gram, score) / lengths
 
 
 def _rank(white: Float[ndarray, "_ c"]) -> float:
     """The rank of the columns (c) that a whitening, or these columns of it, is of."""
-    return white.shape[1] - FAINT * float(np.einsum("ij,ij", white, white))
+    return white.shape[1] - FAINT_SHARE * float(np.einsum("ij,ij", white, white))
 
 
 def _signs(views: int) -> Float[ndarray, "s v"]:
     """Signs for the views, none turned first; all that differ by more than a common sign, or as many at
     random (default_rng(0)).
     """
-    if views <= ALL_SIGNS:
+    if views <= ALL_SIGNS_VIEWS:
         bits = np.arange(2 ** (views - 1))[:, None] >> np.arange(views)
         return 1.0 - 2.0 * (bits & 1)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], (2 ** (ALL_SIGNS - 1), views))
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (2 ** (ALL_SIGNS_VIEWS - 1), views))
     signs[0] = 1.0
     return signs
 

@@ -20,15 +20,20 @@ from orthoscope.models.parameters import INTRINSICS, Parameters
 
 __all__ = ["Slopes", "parameters_of", "slopes_of", "stepped"]
 
-OF_FRAME = ("frame_fx", "frame_fy", "centre_x", "centre_y")  # of a lens that has a frame of its own
+# These parameters belong to a lens that has a frame of its own.
+FRAME_NAMES = ("frame_fx", "frame_fy", "centre_x", "centre_y")
 
 
 class Slopes(NamedTuple):
     """One row for each corner that has an image, all views together.
 
-    view, corner: which view, which row of the target's points. pixels: detected. residual: (n,2) pixels.
-    by_camera: (n,2,k), by `parameters_of`. by_pose: (n,2,6). by_place: (n,2,3) pixels per metre, of the
-    corner in the target.
+    Attributes:
+        view, corner: which view, which row of the target's points.
+        pixels: detected.
+        residual: (n,2) pixels.
+        by_camera: (n,2,k), by `parameters_of`.
+        by_pose: (n,2,6).
+        by_place: (n,2,3) pixels per metre, of the corner in the target.
     """
 
     view: Int[ndarray, " n"]
@@ -90,7 +95,7 @@ def parameters_of(calibration: Calibration) -> tuple[str, ...]:
     camera, estimated = calibration.camera, calibration.uncertainty.deviations
     K = [name for name in INTRINSICS if name != "skew" or camera.intrinsics.skew or name in estimated]
     coefficients = [name for name, value in _coefficients(camera).items() if name in estimated or value]
-    return (*K, *coefficients, *(OF_FRAME if camera.lens_frame else ()))
+    return (*K, *coefficients, *(FRAME_NAMES if camera.lens_frame else ()))
 
 
 def stepped(camera: Camera, name: str, step: float) -> Camera:

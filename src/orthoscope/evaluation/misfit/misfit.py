@@ -41,8 +41,8 @@ corners rms px per point; among the flipped views one in v still votes the true 
 1). Where it sits, d and c, is estimated as normal numbers of that size seen through the noise (ridge
 regression), so that pictures show no noise.
 
-Corners that miss by more than CLIP times the noise count as if they missed by that: a few wild ones neither
-make a misfit nor hide one.
+Corners that miss by more than CLIP_RATIO times the noise count as if they missed by that: a few wild ones
+neither make a misfit nor hide one.
 """
 
 from __future__ import annotations
@@ -63,22 +63,32 @@ from orthoscope.models.difference import image_difference
 
 __all__ = ["LensMisfit", "Misfit", "MisfitTest", "TargetMisfit", "misfit"]
 
-CELLS = 48  # of the image, about: finer than any lens varies, coarse enough for some corners in each
-PATCHES = 300  # of the target, about: each corner is one, but where there are more corners
-TARGET, LENS = 0, (2, 3)  # numbers of the blocks that are tested
-POWERS = (1, 2, 3, 4)  # of the squared distance, in the smooth terms along a radius
-CLIP = 5.0  # times the noise: one corner in 300 000 is beyond it by chance
+# The image has about so many cells: finer than any lens varies, coarse enough for some corners in each.
+CELL_COUNT = 48
+# The target has about so many patches: each corner is one, but where there are more corners.
+PATCH_COUNT = 300
+# The block with this number is tested for the target.
+TARGET_BLOCK = 0
+# The blocks with these numbers are tested for the lens.
+LENS_BLOCKS = (2, 3)
+# The smooth terms along a radius have these powers of the squared distance.
+RADIAL_POWERS = (1, 2, 3, 4)
+# A residual counts at most this many times the noise: one corner in 300 000 is beyond it by chance.
+CLIP_RATIO = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class TargetMisfit:
     """The target against its description.
 
-    displacements: (m,3) metres, target frame, where the corners seem to be minus where they are said to be,
-    as far as that is no noise and neither shift, turn nor size of the whole; NaN for a corner that was not
-    seen. pixels_per_metre: of the typical view. moves_camera_px: how far the camera's image would move if the
-    corners were there (after a rotation, rms over the detected corners, to first order); rather too small,
-    since noise hides part of the displacements.
+    Attributes:
+        displacements: (m,3) metres, target frame, where the corners seem to be minus where they are said to
+            be, as far as that is no noise and neither shift, turn nor size of the whole; NaN for a corner
+            that was not seen.
+        pixels_per_metre: of the typical view.
+        moves_camera_px: how far the camera's image would move if the corners were there (after a rotation,
+            rms over the detected corners, to first order); rather too small, since noise hides part of the
+            displacements.
     """
 
     test: MisfitTest
@@ -91,8 +101,9 @@ class TargetMisfit:
 class LensMisfit:
     """The lens against its formula.
 
-    residuals: (rows, columns, 2) pixels, predicted minus detected, what the views agree on in each cell, as
-    far as that is no noise; NaN for a cell without corners.
+    Attributes:
+        residuals: (rows, columns, 2) pixels, predicted minus detected, what the views agree on in each cell,
+            as far as that is no noise; NaN for a cell without corners.
     """
 
     test: MisfitTest
@@ -113,7 +124,7 @@ def misfit(calibration: Calibration) -> Misfit:
     residuals.
     """
     detections = calibration.detections
-    cells, patches = cells_for(detections.image_size, CELLS), _patches(detections.target.points)
+    cells, patches = cells_for(detections.image_size, CELL_COUNT), _patches(detections.target.points)
     slopes = slopes_of(calibration)
     weight = _weights(slopes.residual)[:, None, None]
     camera = Block(weight * slopes.by_camera, np.zeros_like(slopes.view), 1)
@@ -134,7 +145,7 @@ def misfit(calibration: Calibration) -> Misfit:
     whole = Whitening.of(
         columns.gram
     )  # the target, which is large, stands first: what is granted to the lens is then a block of it
-    of_target, of_lens = agreement(columns, whole, (TARGET,)), agreement(columns, whole, LENS)
+    of_target, of_lens = agreement(columns, whole, (TARGET_BLOCK,)), agreement(columns, whole, LENS_BLOCKS)
     return Misfit(
         TargetMisfit(
             of_target.test,
@@ -147,21 +158,21 @@ def misfit(calibration: Calibration) -> Misfit:
 
 
 def _weights(residual: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
-    """1, but where a residual is larger than CLIP times the noise; there what makes it that large."""
+    """1, but where a residual is larger than CLIP_RATIO times the noise; there what makes it that large."""
     size = np.hypot(*residual.T)
     # Rayleigh's median
     noise = float(np.median(size)) / np.sqrt(2.0 * np.log(2.0)) if len(size) else 0.0
-    return np.minimum(1.0, CLIP * noise / np.maximum(size, 1e-300))
+    return np.minimum(1.0, CLIP_RATIO * noise / np.maximum(size, 1e-300))
 
 
 def _patches(points: Float[ndarray, "m 3"]) -> Int[ndarray, " m"]:
-    """The patch of each corner: itself, or where there are more than PATCHES a square of the target that
+    """The patch of each corner: itself, or where there are more than PATCH_COUNT a square of the target that
     holds some.
     """
-    if len(points) <= PATCHES:
+    if len(points) <= PATCH_COUNT:
         return np.arange(len(points))
     low, span = points[:, :2].min(0), np.ptp(points[:, :2], axis=0)
-    side = np.sqrt(span[0] * span[1] / PATCHES)
+    side = np.sqrt(span[0] * span[1] / PATCH_COUNT)
     row_column = np.floor((points[:, :2] - low) / side * (1.0 - 1e-9)).astype(np.int64)
     return np.unique(row_column, axis=0, return_inverse=True)[1].reshape(-1)
 
@@ -202,7 +213,7 @@ def _smooth_terms(camera: Camera, pixels: Float[ndarray, "n 2"]) -> Float[ndarra
     frame = camera.lens_frame or camera.intrinsics
     x, y = ((pixels - [frame.cx, frame.cy]) / (0.5 * np.hypot(*camera.image_size))).T
     s, zero = x * x + y * y, np.zeros_like(x)
-    radial = [(x * s**power, y * s**power) for power in POWERS]
+    radial = [(x * s**power, y * s**power) for power in RADIAL_POWERS]
     decentering = [(s + 2.0 * x * x, 2.0 * x * y), (2.0 * x * y, s + 2.0 * y * y)]
     prism = [(s, zero), (zero, s), (s * s, zero), (zero, s * s)]
     return np.moveaxis(np.array([*radial, *decentering, *prism]), 0, -1).transpose(1, 0, 2)

@@ -1,9 +1,9 @@
 """Scores made white: what least squares on columns explains, and the rank of the columns, from one triangle.
 
-G is the gram matrix of columns that are scaled to length 1, FAINT I added: a direction that is as faint as
-that counts as none. With G = L L^T and W = L^-1, the columns explain |W z|^2 of a residual whose products
-with them are z, and their rank is the trace of (G - FAINT I) G^-1. The first columns' block of W is their
-own, whatever follows them.
+G is the gram matrix of columns that are scaled to length 1, FAINT_SHARE I added: a direction that is as faint
+as that counts as none. With G = L L^T and W = L^-1, the columns explain |W z|^2 of a residual whose products
+with them are z, and their rank is the trace of (G - FAINT_SHARE I) G^-1. The first columns' block of W is
+their own, whatever follows them.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
-__all__ = ["FAINT", "Whitening"]
+__all__ = ["FAINT_SHARE", "Whitening"]
 
-FAINT = 1e-8  # squared share of a column: what is left of it after elimination is rounding when it is no more
-SMALL = 64  # columns: a triangle that is inverted as any matrix
+# What elimination leaves of a column is rounding when its squared share is no more.
+FAINT_SHARE = 1e-8
+# A triangle with no more columns is inverted as any matrix.
+SMALL_SIZE = 64
 
 
 class Whitening(NamedTuple):
@@ -36,7 +38,7 @@ class Whitening(NamedTuple):
         lengths = np.sqrt(np.where(squares > 0.0, squares, 1.0))
         scaled = gram / lengths[:, None]
         scaled /= lengths
-        np.fill_diagonal(scaled, scaled.diagonal() + FAINT)
+        np.fill_diagonal(scaled, scaled.diagonal() + FAINT_SHARE)
         return cls(lengths, scaled, _white(scaled))
 
     def white_of(self, some: Int[ndarray, " s"]) -> Float[ndarray, "s s"]:
@@ -54,7 +56,7 @@ def _white(gram: Float[ndarray, "c c"]) -> Float[ndarray, "c c"]:
 
 def _invert(lower: Float[ndarray, "c c"]) -> None:
     """Makes a lower triangle its inverse, by halves."""
-    if len(lower) <= SMALL:
+    if len(lower) <= SMALL_SIZE:
         lower[:] = np.linalg.inv(lower)
         return
     half = len(lower) // 2

@@ -17,7 +17,7 @@ __all__ = ["ADVICE", "Advice", "advice_on"]
 class Advice(NamedTuple):
     """Something that a user can do.
 
-    Args:
+    Attributes:
         cause: what it is against; empty where nothing is wrong.
         says: the sentence.
         when: whether it applies.

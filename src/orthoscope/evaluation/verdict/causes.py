@@ -11,26 +11,38 @@ from collections.abc import Callable, Sequence
 from math import isnan
 from typing import NamedTuple
 
-from orthoscope.evaluation.verdict.grades import WIDE, Grade
+from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
+from orthoscope.geometry.numbers import rough_pixels
 
 __all__ = ["CAUSES", "FEW_VIEWS", "Cause", "listed"]
 
-UNTOLD = 4  # photographs: with fewer, no error can be told
+# With fewer photographs no error can be told.
+FEWEST_PHOTOGRAPHS = 4
+# Fewer photographs than this are few.
 FEW_VIEWS = 8
-LEVEL = 12.0  # degrees: photographs with less tilt are all frontal
-NOTICED = 0.5  # of the corners' noise: cameras that differ by less are as good as one
+# Photographs with less tilt, degrees, are all frontal.
+LEVEL_DEGREES = 12.0
+# Cameras that differ by less than this share of the corners' noise are as good as one.
+NOTICED_SHARE = 0.5
+# Cameras that differ by less, pixels, are one camera for everyone.
 NEGLIGIBLE_PX = 0.05
-STIFF = 0.5  # of the corners' noise: what a free lens may miss
-WILD = 0.005  # of the corners: chance makes hardly any
-SPARSE = 0.75  # of the frame's cells: with corners in fewer, it is corners that are missing
-NAMED = 3  # images that a sentence lists
+# A free lens may miss up to this share of the corners' noise.
+STIFF_SHARE = 0.5
+# Chance makes hardly so large a share of the corners wild.
+WILD_SHARE = 0.005
+# With corners in less than this share of the frame's cells, it is corners that are missing.
+SPARSE_SHARE = 0.75
+# A sentence lists so many images.
+NAMED_IMAGES = 3
+# A principal point that is known no better than this share of the image's width is open.
+ADRIFT_SHARE = 0.1
 
 
 class Cause(NamedTuple):
     """Something that may limit a camera.
 
-    Args:
+    Attributes:
         name: in a file and in tests.
         holds: whether it does.
         allows: the best grade with it.
@@ -45,51 +57,54 @@ class Cause(NamedTuple):
 
 def listed(images: Sequence[str]) -> str:
     """`a, b and c`, or `a, b, c and 5 more`."""
-    shown = list(images[:NAMED])
-    if len(images) > NAMED:
-        return f"{', '.join(shown)} and {len(images) - NAMED} more"
+    shown = list(images[:NAMED_IMAGES])
+    if len(images) > NAMED_IMAGES:
+        return f"{', '.join(shown)} and {len(images) - NAMED_IMAGES} more"
     return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
 
 
 def _matters(s: Situation) -> bool:
-    return bool(s.disagree) and s.differ_px > max(NOTICED * s.noise_px, NEGLIGIBLE_PX)
+    return bool(s.disagree) and s.differ_px > max(NOTICED_SHARE * s.noise_px, NEGLIGIBLE_PX)
 
 
 def _lens_is_missed(s: Situation) -> bool:
     """A free lens is as stiff as its data made it, and misses a little of every lens by intent."""
-    return s.lens_px > (STIFF * s.noise_px if s.lens == "free" else 0.0)
+    return s.lens_px > (STIFF_SHARE * s.noise_px if s.lens == "free" else 0.0)
 
 
 def _of_photographs(s: Situation) -> Grade:
     apart = 2.0 * s.differ_px if s.groups else s.differ_px
     if s.disagree == "shutter" and not s.groups:  # the camera is one; what the shutter did is in its error
-        return Grade.USABLE
+        return _as_far_as_it_goes(s)
     return Grade.NO if apart > s.coarse_px else Grade.USABLE
 
 
+APART = "the photographs do not agree on one camera"
 KINDS = {
     "zoom": lambda s: (
-        f"the focal length changes between them by about {100 * s.differ_focal:.2g} % (zoom or focus)"
+        f"{APART}: the focal length changes between them by about {100 * s.differ_focal:.2g} % (zoom or"
+        " focus)"
     ),
     "centre": lambda s: (
-        f"the image moves on the sensor by about {s.differ_centre_px:.2g} px (a stabiliser or cropping)"
+        f"{APART}: the image moves on the sensor by about {rough_pixels(s.differ_centre_px)} px"
+        " (a stabiliser or cropping)"
     ),
-    "shutter": lambda s: "they were read row by row while camera or target moved (a rolling shutter)",
+    # It is one camera all the same.
+    "shutter": lambda s: (
+        "the photographs were read row by row while camera or target moved (a rolling shutter)"
+    ),
 }
 
 
 def _photographs(s: Situation) -> str:
-    how = (
-        f"{listed(s.groups[1])} are of another than {listed(s.groups[0])}"
-        if s.groups
-        else KINDS[s.disagree](s)
-    )
-    return f"the photographs do not agree on one camera: {how}"
+    if s.groups:
+        return f"{APART}: {listed(s.groups[1])} are of another than {listed(s.groups[0])}"
+    return KINDS[s.disagree](s)
 
 
 def _open(s: Situation) -> bool:
     """Whether the camera is not known well enough, and not for lack of corners in some part of the frame."""
-    return s.error_px > FINE_PX or (s.held < WIDE and s.covered >= SPARSE)
+    return s.error_px > FINE_PX or (s.held < WIDE_SHARE and s.covered >= SPARSE_SHARE)
 
 
 def _as_far_as_known(s: Situation) -> Grade:
@@ -104,7 +119,7 @@ def _as_far_as_it_goes(s: Situation) -> Grade:
 CAUSES: tuple[Cause, ...] = (
     Cause(
         "few",
-        lambda s: s.views < UNTOLD or isnan(s.error_px),
+        lambda s: s.views < FEWEST_PHOTOGRAPHS or isnan(s.error_px),
         lambda s: Grade.NO if s.views < 2 or isnan(s.error_px) else Grade.USABLE,
         lambda s: f"{_photograph(s.views)} cannot tell how far off it is",
     ),
@@ -118,9 +133,11 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "corners",
-        lambda s: s.wild > WILD * s.corners,
-        lambda s: Grade.USABLE,
-        lambda s: f"{s.wild} of {s.corners} corners are far from where the others put them",
+        lambda s: s.wild > WILD_SHARE * s.corners,
+        lambda s: _as_far_as_it_goes(s) if s.method == "decoupled" else Grade.USABLE,
+        lambda s: (
+            f"{s.wild} of {s.corners} corners are far from where the others put them{_where(s.wild_in)}"
+        ),
     ),
     Cause("photographs", _matters, _of_photographs, _photographs),
     Cause(
@@ -129,7 +146,7 @@ CAUSES: tuple[Cause, ...] = (
         _as_far_as_it_goes,
         lambda s: (
             f"{_formula(s)} cannot follow this lens: at the same places of every photograph"
-            f" corners are off by {s.lens_px:.2g} px"
+            f" corners are off by {rough_pixels(s.lens_px)} px"
         ),
     ),
     Cause(
@@ -146,7 +163,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "tilt",
-        lambda s: _open(s) and s.tilt < LEVEL,
+        lambda s: _open(s) and s.tilt < LEVEL_DEGREES,
         _as_far_as_known,
         lambda s: "the target faced the camera in all photographs, so its focal length is open",
     ),
@@ -160,7 +177,16 @@ CAUSES: tuple[Cause, ...] = (
             else f"of {s.views} photographs only {s.distinct} differ from one another"
         ),
     ),
-    Cause("open", _open, _as_far_as_known, lambda s: "these photographs do not tell it better"),
+    Cause(
+        "open",
+        _open,
+        _as_far_as_known,
+        lambda s: (
+            "where the lens's axis meets the image is open, as it is with a lens this long"
+            if s.centre_sd > ADRIFT_SHARE
+            else "these photographs do not tell it better"
+        ),
+    ),
     Cause(
         "solver",
         lambda s: not s.converged and s.error_px > FINE_PX,
@@ -169,11 +195,15 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "region",
-        lambda s: s.held < WIDE,
+        lambda s: s.held < WIDE_SHARE,
         lambda s: Grade.REGION,
         lambda s: f"too few corners were seen {s.place}",
     ),
 )
+
+
+def _where(images: Sequence[str]) -> str:
+    return f", in {listed(images)}" if images else ""
 
 
 def _photograph(count: int) -> str:

@@ -13,20 +13,22 @@ from orthoscope.evaluation.misfit.f_test import is_misfit
 from orthoscope.evaluation.misfit.misfit import Misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit
 from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
-from orthoscope.evaluation.verdict.situation import FINE_PX, Situation, coarse_px
+from orthoscope.evaluation.verdict.situation import FINE_PX, USUAL_WIDTH, Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.solve.least_squares import Status
 from orthoscope.targets.detections import Detections
 
 __all__ = ["Findings", "corners_beyond", "distinct_views", "share_within", "situation_of"]
 
-# in an image of 1000 pixels: views whose corners are apart by less (median) are the same photograph again
+# Views whose corners are apart by less (median, pixels in an image of 1000) are the same photograph again.
 COPIED_PX = 1.0
-USUAL_WIDTH = 1000.0
-# Corners by which most pairs of photographs are seen to differ.
-SAMPLE = 16
-DISTINCT = 0.7  # of the views: with more copies among them, that they agree says nothing
-WILD = 12.0  # times the median residual: farther off than heavy tails reach
+# So many corners show that most pairs of photographs differ.
+SAMPLE_CORNERS = 16
+# With no more than this share of the views left without copies, that they agree says nothing.
+DISTINCT_SHARE = 0.7
+# A residual of more than this many times the median is farther off than heavy tails reach.
+WILD_FACTOR = 12.0
+# No residual below this, pixels, is called wild.
 WILD_PX = 0.5
 
 
@@ -50,7 +52,8 @@ def situation_of(found: Findings) -> Situation:
     images = [view.image for view in detections.views]
     known = reference.known if reference else None
     suspects = suspects_among(found.views, known, detections.target.points)
-    told = distinct > DISTINCT * views  # copies agree with each other whatever is true
+    wild = _wild(calibration, {image for image, _ in suspects})
+    told = distinct > DISTINCT_SHARE * views  # copies agree with each other whatever is true
     return Situation(
         method=calibration.method,
         lens=str(settings.get("lens", "")),
@@ -62,6 +65,8 @@ def situation_of(found: Findings) -> Situation:
         distinct=distinct,
         converged=calibration.status == Status.CONVERGED,
         error_px=_error(reference, disagreement, views / distinct),
+        near_px=_error(reference, disagreement, views / distinct, near=True),
+        centre_sd=_centre_deviation(calibration),
         coarse_px=coarse_px(detections.image_size),
         share=share_within(reference, np.sqrt(views / distinct)),
         covered=share_covered(calibration),
@@ -69,7 +74,8 @@ def situation_of(found: Findings) -> Situation:
         noise_px=float(np.sqrt(2.0 * known.noise)) if known else calibration.rms_px,
         tilt=_tilt(calibration),
         corners=detections.corners,
-        wild=_wild(calibration, {image for image, _ in suspects}),
+        wild=sum(wild.values()),
+        wild_in=tuple(sorted(wild, key=lambda image: -wild[image])),
         beyond=corners_beyond(calibration),
         fold=float(np.degrees(calibration.camera.lens.field_angle)),
         disagree=disagreement.kind,
@@ -102,7 +108,7 @@ def distinct_views(detections: Detections) -> int:
     for table, view in zip(tables, detections.views, strict=True):
         table[view.ids] = view.pixels
     kept = np.empty_like(tables)
-    some = np.unique(np.linspace(0, tables.shape[1] - 1, SAMPLE).round().astype(int))
+    some = np.unique(np.linspace(0, tables.shape[1] - 1, SAMPLE_CORNERS).round().astype(int))
     count = 0
     for table in tables:
         # Where none of a few corners is near, half of all are not.
@@ -128,28 +134,40 @@ def share_within(reference: ReferenceFit | None, larger: float = 1.0, limit: flo
     return float((larger * known <= limit).mean()) if known.size else 0.0
 
 
-def _error(reference: ReferenceFit | None, disagreement: Disagreement, copies: float) -> float:
+def _error(
+    reference: ReferenceFit | None, disagreement: Disagreement, copies: float, *, near: bool = False
+) -> float:
     """The camera error: that of the camera, and of how cameras differ from photograph to photograph.
 
     Args:
         copies: photographs for each that is distinct; copies add nothing, and each was counted.
+        near: of things where the target was, else of what is far away.
     """
     if reference is None:
         return float("nan")
     apart = 0.0 if disagreement.kind == "shutter" else disagreement.by_px
-    return float(np.hypot(np.sqrt(copies) * reference.error.seen_px, apart))
+    own = reference.error.near_seen_px if near else reference.error.seen_px
+    return float(np.hypot(np.sqrt(copies) * own, apart))
 
 
-def _wild(calibration: Calibration, suspects: set[str]) -> int:
-    """How many corners are far from where the others put them, photographs that do not belong left aside."""
+def _centre_deviation(calibration: Calibration) -> float:
+    """Standard deviation of the principal point along x or y, whichever is larger, over the image's width."""
+    deviations = calibration.uncertainty.deviations
+    return max(deviations.get("cx", 0.0), deviations.get("cy", 0.0)) / calibration.camera.image_size[0]
+
+
+def _wild(calibration: Calibration, suspects: set[str]) -> dict[str, int]:
+    """How many corners of each image are far from where the others put them, images without any and
+    photographs that do not belong left aside.
+    """
     sizes = [np.hypot(*e.T) for e in calibration.residuals()]
-    limit = max(WILD * float(np.median(np.concatenate(sizes))), WILD_PX)
+    limit = max(WILD_FACTOR * float(np.median(np.concatenate(sizes))), WILD_PX)
     views = calibration.detections.views
-    return sum(
-        int((size > limit).sum())
+    return {
+        view.image: int((size > limit).sum())
         for size, view in zip(sizes, views, strict=True)
-        if view.image not in suspects
-    )
+        if view.image not in suspects and (size > limit).any()
+    }
 
 
 def _tilt(calibration: Calibration) -> float:

@@ -1,8 +1,9 @@
 """The four grades, and the figures that define them: one table, and nowhere else.
 
 A grade is given by how far off the camera is where corners were seen (error_px), and by the share of the
-frame over which it is off by FINE_PX at most and corners were seen.  What is known to be wrong (causes.py)
-can lower it, never raise it.
+frame over which it is off by FINE_PX at most and corners were seen.  A camera that is too far off for what is
+far away may still serve where the target was (near_px): there a shift of the camera undoes what the
+photographs leave open.  What is known to be wrong (causes.py) can lower a grade, never raise it.
 """
 
 from __future__ import annotations
@@ -11,11 +12,13 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import NamedTuple
 
-from orthoscope.evaluation.verdict.situation import COARSE_PX, FINE_PX, Situation
+from orthoscope.evaluation.verdict.situation import COARSE_PX, FINE_PX, NEAR_PX, Situation
 
-__all__ = ["GRADES", "WIDE", "Grade", "by_error", "lower"]
+__all__ = ["GRADES", "WIDE_SHARE", "Grade", "by_error", "lower"]
 
-WIDE = 0.7  # of the frame: what is left is corners of it that a board rarely reaches
+# A camera holds widely over this share of the frame; what is left is corners of it that a board rarely
+# reaches.
+WIDE_SHARE = 0.7
 
 
 class Grade(StrEnum):
@@ -36,8 +39,9 @@ class _Row(NamedTuple):
 GRADES: tuple[_Row, ...] = (
     _Row(
         Grade.GOOD,
-        f"off by {FINE_PX:g} px at most where corners were seen: {100 * WIDE:.0f} % of the frame or more",
-        lambda s: s.error_px <= FINE_PX and s.held >= WIDE,
+        f"off by {FINE_PX:g} px at most where corners were seen: {100 * WIDE_SHARE:.0f} % of the frame or"
+        " more",
+        lambda s: s.error_px <= FINE_PX and s.held >= WIDE_SHARE,
     ),
     _Row(
         Grade.REGION,
@@ -46,8 +50,9 @@ GRADES: tuple[_Row, ...] = (
     ),
     _Row(
         Grade.USABLE,
-        f"off by more, or with a fault that is named, but by {COARSE_PX:g} px (in 1000) at most",
-        lambda s: s.error_px <= s.coarse_px,
+        f"off by more, or with a fault that is named, but by {COARSE_PX:g} px (in 1000) at most, or by"
+        f" {NEAR_PX:g} px at the target's distances",
+        lambda s: s.error_px <= s.coarse_px or s.near_px <= NEAR_PX,
     ),
     _Row(Grade.NO, "off by more than that, or nobody knows by how much", lambda s: True),
 )

@@ -7,10 +7,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["COARSE_PX", "FINE_PX", "NOTHING_KNOWN", "Situation", "coarse_px"]
+__all__ = ["COARSE_PX", "FINE_PX", "NEAR_PX", "NOTHING_KNOWN", "USUAL_WIDTH", "Situation", "coarse_px"]
 
-FINE_PX = 0.5  # a camera that is off by no more serves everyone: corners are found to about that
-COARSE_PX = 3.0  # in an image of 1000 pixels: a camera that is off by more serves nobody
+# A camera that is off by no more, pixels, serves everyone: corners are found to about that.
+FINE_PX = 0.5
+# A camera that is off by more, pixels in an image of 1000, serves nobody.
+COARSE_PX = 3.0
+# One that is off by more than this even at the distances where the target was serves nobody there either.
+NEAR_PX = 1.0
+# Limits in pixels are meant for an image of this width, and grow with a larger one.
 USUAL_WIDTH = 1000.0
 
 
@@ -18,14 +23,17 @@ USUAL_WIDTH = 1000.0
 class Situation:
     """The facts.
 
-    Args:
+    Attributes:
         method, lens, base, first_lens: what the calibration was made by, as it is called again; empty
             where it has no such setting.
         shape: of the target, that it came to.
         views: photographs that were used.
         distinct: of these, those that are not near-copies of another.
         converged: whether the search for the camera came to an end.
-        error_px: how far off the camera is, rms over the seen part; NaN where nothing says.
+        error_px: how far off the camera is, rms over the seen part, of what is far away; NaN where nothing
+            says.
+        near_px: the same of things where the target was; NaN where nothing says.
+        centre_sd: standard deviation of the principal point, as a share of the image's width.
         coarse_px: error above which it is of no use.
         share: of the frame over which it is off by FINE_PX at most, by what is predicted; where no corners
             were seen that rests on a formula which nothing has tested.
@@ -35,6 +43,7 @@ class Situation:
         tilt: of the target against the line of sight, degrees, in the photograph that has most but one.
         corners: that were used.
         wild: of these, far from where the others put them.
+        wild_in: images that they are in, that with most of them first.
         loss: how errors count, where the method has such a setting.
         beyond: corners that lie where the lens formula has ended.
         fold: degrees from the axis at which it ends.
@@ -60,6 +69,8 @@ class Situation:
     distinct: int = 15
     converged: bool = True
     error_px: float = 0.1
+    near_px: float = float("nan")
+    centre_sd: float = 0.0
     coarse_px: float = COARSE_PX
     share: float = 1.0
     covered: float = 1.0
@@ -68,6 +79,7 @@ class Situation:
     tilt: float = 40.0
     corners: int = 800
     wild: int = 0
+    wild_in: tuple[str, ...] = ()
     loss: str = ""
     beyond: int = 0
     fold: float = float("nan")

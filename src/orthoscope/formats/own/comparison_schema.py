@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
-from orthoscope.evaluation.comparison.entry import Entry
+from orthoscope.evaluation.comparison.entry import AS_IT_IS, Entry
 from orthoscope.formats.own.schema import CameraFile, DetectionsFile, TargetShapeFile
 from orthoscope.formats.own.struct import FileStruct, Number, array_of, null_for_nan, rows_of
 from orthoscope.geometry.arrays import InputError
@@ -48,15 +48,17 @@ class StandingFile(FileStruct, kw_only=True):
             squares=rows_of(standing.squares),
             camera=CameraFile.of(standing.camera) if standing.camera else None,
             target_shape=TargetShapeFile.of(shape) if shape else None,
-            **{name: null_for_nan(getattr(standing, name)) for name in NUMBERS},
+            **{name: null_for_nan(getattr(standing, name)) for name in NUMBER_FIELDS},
         )
 
     def core(self) -> Standing:
-        numbers = {name: getattr(self, name) for name in NUMBERS}
+        numbers = {name: getattr(self, name) for name in NUMBER_FIELDS}
+        camera = self.camera and self.camera.core()
+        given = camera if self.method == AS_IT_IS else None
         return Standing(
-            Entry(self.name, self.method, self.settings),
+            Entry(self.name, self.method, self.settings, given),
             array_of(self.squares, -1),
-            camera=self.camera and self.camera.core(),
+            camera=camera,
             target_shape=self.target_shape and self.target_shape.core(),
             lens=self.lens,
             failure=self.failure,
@@ -90,4 +92,5 @@ class ComparisonFile(FileStruct, kw_only=True):
         return Comparison(self.detections.core(), self.folds, standings)
 
 
-NUMBERS = tuple(name for name, kind in StandingFile.__annotations__.items() if kind == "Number")
+# These fields are one number each.
+NUMBER_FIELDS = tuple(name for name, kind in StandingFile.__annotations__.items() if kind == "Number")

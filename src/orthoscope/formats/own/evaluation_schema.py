@@ -178,6 +178,9 @@ class SituationFile(Record):
     target_mm: Number
     suspects: tuple[tuple[str, str], ...]
     precious: tuple[tuple[str, str], ...]
+    near_px: Number = None
+    centre_sd: float = 0.0
+    wild_in: tuple[str, ...] = ()
 
 
 class GroupsFile(Record):
@@ -231,7 +234,7 @@ class EvaluationFile(FileStruct, kw_only=True):
             disagreement=DisagreementFile.of(evaluation.disagreement),
             groups=GroupsFile.of(evaluation.groups) if evaluation.groups else None,
             folds=evaluation.folds,
-            **{name: null_for_nan(getattr(evaluation, name)) for name in NUMBERS},
+            **{name: null_for_nan(getattr(evaluation, name)) for name in NUMBER_FIELDS},
         )
 
     def core(self, calibration: Calibration) -> Evaluation:
@@ -250,7 +253,8 @@ class EvaluationFile(FileStruct, kw_only=True):
             raise InputError(f"it has not {len(self.views)} tables of held-out residuals, one for each view")
         situation = self.situation.core()
         numbers: dict[str, Any] = {
-            name: float("nan") if getattr(self, name) is None else getattr(self, name) for name in NUMBERS
+            name: float("nan") if getattr(self, name) is None else getattr(self, name)
+            for name in NUMBER_FIELDS
         }
         return Evaluation(
             calibration=calibration,
@@ -272,6 +276,5 @@ class EvaluationFile(FileStruct, kw_only=True):
         )
 
 
-NUMBERS = tuple(  # the fields that are one number each, here and in the core
-    name for name, kind in EvaluationFile.__annotations__.items() if kind == "Number"
-)
+# These fields are one number each, here and in the core.
+NUMBER_FIELDS = tuple(name for name, kind in EvaluationFile.__annotations__.items() if kind == "Number")

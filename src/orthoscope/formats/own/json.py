@@ -41,7 +41,8 @@ __all__ = [
 ]
 
 FORMAT = 1
-KINDS = {  # what a file says it is: the type in memory, the schema on disk and where that stands
+# What a file says it is has a type in memory, and a schema on disk that stands in this module.
+KINDS_OF_FILE = {
     "detections": ("Detections", "DetectionsFile", "schema"),
     "calibration": ("Calibration", "CalibrationFile", "schema"),
     "evaluation": ("Evaluation", "EvaluationFile", "evaluation_schema"),
@@ -49,7 +50,8 @@ KINDS = {  # what a file says it is: the type in memory, the schema on disk and 
     "camera": ("Camera", "CameraFile", "schema"),
     "scene": ("Scene", "SceneFile", "schema"),
 }
-CALIBRATION = "calibration.json"  # what an evaluation judges: the file of this name beside its own
+# An evaluation judges the file of this name beside its own.
+CALIBRATION_NAME = "calibration.json"
 
 
 class _Header(msgspec.Struct):
@@ -60,7 +62,7 @@ class _Header(msgspec.Struct):
 @cache
 def _schema(kind: str) -> Any:
     """What objects of a kind are written with; imported when it is first asked for, since few verbs judge."""
-    _, name, module = KINDS[kind]
+    _, name, module = KINDS_OF_FILE[kind]
     return getattr(importlib.import_module(f"orthoscope.formats.own.{module}"), name)
 
 
@@ -77,9 +79,11 @@ def text_of(thing: Detections | Calibration | Evaluation | Comparison | Camera |
     Raises:
         InputError: a setting has no plain value, or this is nothing that has a file.
     """
-    kinds = {core: kind for kind, (core, *_) in KINDS.items()}
+    kinds = {core: kind for kind, (core, *_) in KINDS_OF_FILE.items()}
     if (kind := kinds.get(type(thing).__name__)) is None:
-        raise InputError(f"{type(thing).__name__} cannot be saved; expected one of {', '.join(KINDS)}.")
+        raise InputError(
+            f"{type(thing).__name__} cannot be saved; expected one of {', '.join(KINDS_OF_FILE)}."
+        )
     try:
         plain = msgspec.to_builtins(_schema(kind).of(thing))
         return lay_out({"orthoscope": kind, "format": FORMAT, **plain}) + "\n"
@@ -116,7 +120,7 @@ def _loaded(content: bytes, path: str | Path) -> Any:
     """What the bytes of a file of ours hold; errors as `load`."""
     content = content.removeprefix(b"\xef\xbb\xbf")
     kind = _kind(content, path)
-    judged = [load_calibration(Path(path).with_name(CALIBRATION))] if kind == "evaluation" else []
+    judged = [load_calibration(Path(path).with_name(CALIBRATION_NAME))] if kind == "evaluation" else []
     return _thing(content, kind, path, judged)
 
 
@@ -156,7 +160,9 @@ def load_evaluation(path: str | Path, calibration: Calibration | None = None) ->
         raise InputError(
             f"{path} holds {_article(kind)}; expected an evaluation. Hand in the file that has it."
         )
-    return _thing(content, kind, path, [calibration or load_calibration(Path(path).with_name(CALIBRATION))])
+    return _thing(
+        content, kind, path, [calibration or load_calibration(Path(path).with_name(CALIBRATION_NAME))]
+    )
 
 
 def load_own_camera(path: str | Path) -> Camera:
@@ -209,7 +215,7 @@ def _kind(content: bytes, path: str | Path) -> str:
             f"{path} was written by a newer orthoscope (format {header.format}; this one reads up to"
             f" {FORMAT}). Upgrade: pip install -U orthoscope."
         )
-    if header.orthoscope not in KINDS or header.format < 1:
+    if header.orthoscope not in KINDS_OF_FILE or header.format < 1:
         raise InputError(_foreign(path))
     return header.orthoscope
 
@@ -217,8 +223,8 @@ def _kind(content: bytes, path: str | Path) -> str:
 def _foreign(path: str | Path) -> str:
     return (
         f"{path} is JSON, but not of orthoscope; expected an object that opens with "
-        f'{{"orthoscope": "{"|".join(KINDS)}", "format": {FORMAT}, ...}}. Hand in a file that orthoscope'
-        " wrote."
+        f'{{"orthoscope": "{"|".join(KINDS_OF_FILE)}", "format": {FORMAT}, ...}}. Hand in a file that'
+        " orthoscope wrote."
     )
 
 

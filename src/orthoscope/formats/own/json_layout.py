@@ -15,7 +15,8 @@ import msgspec
 
 __all__ = ["lay_out"]
 
-WIDTH = 120  # an object of plain values that fits stays on one line
+# An object of plain values that fits in so many characters stays on one line.
+LINE_WIDTH = 120
 OTHERWISE = (
     "e",
     "0.0000",
@@ -40,7 +41,7 @@ def lay_out(value: Any, indent: str = "") -> str:
     )
     if not any(isinstance(entry, dict | list | tuple) for entry in entries):
         line = _line(value)
-        if not isinstance(value, dict) or len(indent) + len(line) <= WIDTH:
+        if not isinstance(value, dict) or len(indent) + len(line) <= LINE_WIDTH:
             return line
     if isinstance(value, dict):
         return _block(

@@ -29,9 +29,9 @@ from orthoscope.models.target_shape import TargetShape
 from orthoscope.simulation.scene import Scene
 from orthoscope.targets.board import Board
 from orthoscope.targets.chessboard import Chessboard
-from orthoscope.targets.detections import Detections, Outlier, SetAside, View
+from orthoscope.targets.detections import Detections, Outlier, Remark, SetAside, View
 from orthoscope.targets.table import TARGETS, as_fields
-from orthoscope.targets.target import Target
+from orthoscope.targets.target import Target, several
 
 __all__ = ["CalibrationFile", "CameraFile", "DetectionsFile", "SceneFile"]
 
@@ -44,16 +44,24 @@ class TargetFile(FileStruct, kw_only=True):
     points: list[tuple[float, float, float]]
     lines: list[list[int]] = []
     board: dict[str, Any] | None = None  # a chessboard is known by its grid
+    members: list[TargetFile] = []  # of several targets; points and lines then follow from theirs
 
     @classmethod
     def of(cls, target: Target) -> TargetFile:
         lines = [line.tolist() for line in target.lines]
         board = None if target.board is None or target.kind == Chessboard.kind else as_fields(target.board)
         return cls(
-            name=target.name, grid=target.grid, points=target.points.tolist(), lines=lines, board=board
+            name=target.name,
+            grid=target.grid,
+            points=target.points.tolist(),
+            lines=lines,
+            board=board,
+            members=[cls.of(member) for member in target.members],
         )
 
     def core(self) -> Target:
+        if self.members:
+            return several([member.core() for member in self.members])
         points = np.array(self.points, dtype=float).reshape(-1, 3)
         lines = tuple(np.array(line, dtype=np.int64) for line in self.lines)
         return Target(self.name, points, lines, self.grid, _board(self.board) if self.board else None)
@@ -86,6 +94,7 @@ class DetectionsFile(FileStruct):
     set_aside: list[tuple[str, str]] = []
     outliers: list[tuple[str, int, tuple[float, float], str]] = []
     disc_centres: bool = False
+    remarks: list[tuple[str, str]] = []
 
     @classmethod
     def of(cls, detections: Detections) -> DetectionsFile:
@@ -96,6 +105,7 @@ class DetectionsFile(FileStruct):
             [(image, reason) for image, reason in detections.set_aside],
             [(image, corner, pixel, reason) for image, corner, pixel, reason in detections.outliers],
             detections.disc_centres,
+            [(image, words) for image, words in detections.remarks],
         )
 
     def core(self) -> Detections:
@@ -104,7 +114,10 @@ class DetectionsFile(FileStruct):
             tuple(SetAside(*entry) for entry in self.set_aside),
             tuple(Outlier(*entry) for entry in self.outliers),
         )
-        return Detections(self.target.core(), self.image_size, views, aside, outliers, self.disc_centres)
+        remarks = tuple(Remark(*entry) for entry in self.remarks)
+        return Detections(
+            self.target.core(), self.image_size, views, aside, outliers, self.disc_centres, remarks
+        )
 
 
 class IntrinsicsFile(FileStruct, omit_defaults=False):

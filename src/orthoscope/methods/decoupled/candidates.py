@@ -20,7 +20,7 @@ from orthoscope.fitting.scatter import Scatter, scatter_of
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.fitters import Fitter, Kept
 from orthoscope.methods.decoupled.model import JOINT, PAIRS, Model
-from orthoscope.methods.decoupled.model_selection import NOTHING, Contender
+from orthoscope.methods.decoupled.model_selection import NEGLIGIBLE_SQUARE, Contender
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.decoupled.step_two import formula_from_pairs
 from orthoscope.methods.decoupled.step_two_linearised import PairsLeftOut
@@ -33,8 +33,10 @@ __all__ = ["JOINT", "PAIRS", "Candidates", "Model"]
 class Candidates:
     """Models fitted to the same photographs, each when it is asked for, and once.
 
-    detections: views that belong.  skew: whether K has one.  fitter: how they are fitted; each from nothing
-    and to the last digit by default.
+    Args:
+        detections: views that belong.
+        skew: whether K has one.
+        fitter: how they are fitted; each from nothing and to the last digit by default.
     """
 
     def __init__(self, detections: Detections, *, skew: bool, fitter: Fitter | None = None) -> None:
@@ -57,13 +59,14 @@ class Candidates:
     def residuals(self, model: Model) -> Float[ndarray, "m n"]:
         """Of each view by the model without it, as in `LeaveOneOut`.
 
-        Raises CalibrationError where the model cannot be fitted.
+        Raises:
+            CalibrationError: the model cannot be fitted.
         """
         if model.formula:
             return self.from_pairs(model).residuals
         fit = self.linearised(model)
         # Without noise nothing holds back what one view alone decides, and nothing has to: it is exact.
-        return fit.errors if fit.noise < NOTHING else self.left_out(model).residuals
+        return fit.errors if fit.noise < NEGLIGIBLE_SQUARE else self.left_out(model).residuals
 
     def fits(self, calibration: Calibration) -> bool:
         """Whether these are the fits of a calibration's own photographs."""
@@ -73,7 +76,8 @@ class Candidates:
     def camera(self, model: Model) -> tuple[Camera, tuple[str, ...]]:
         """The model's camera, and the names of its parameters that were fitted.
 
-        Raises CalibrationError where the views cannot tell them.
+        Raises:
+            CalibrationError: the views cannot tell them.
         """
         fit = self.step_one(model.step_one)
         return (

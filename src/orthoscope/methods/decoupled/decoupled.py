@@ -49,7 +49,8 @@ from orthoscope.version import __version__
 __all__ = ["BASES", "decoupled"]
 
 AUTO = "auto"
-BASES = ("brown", "kannala_brandt", "rational")  # in order of preference
+# These are the base formulas, in order of preference.
+BASES = ("brown", "kannala_brandt", "rational")
 TOO_FEW = (
     f"fewer than {FEWEST_VIEWS} views cannot be judged by views that were not used; where nothing else was"
     " asked for, the target is taken to be as it is said to be, and the lens to follow its formula"
@@ -130,7 +131,8 @@ def decoupled(
 def _open(lens: str, shape: str, base: str, first_lens: str, fit: str, formulas: Sequence[str]) -> _Open:
     """What the settings leave open.
 
-    Raises InputError for a setting that is none, or for two that contradict each other.
+    Raises:
+        InputError: a setting is none, or two contradict each other.
     """
     if shape not in (AUTO, *SHAPES):
         raise InputError(f"target shape {shape!r} is not known; expected one of {AUTO}, {', '.join(SHAPES)}.")
@@ -176,7 +178,8 @@ def _chosen(
 ) -> tuple[Model, tuple[Candidate, ...]]:
     """The base by the richest model on it; then the target's shape and the lens of step 1; then the formula.
 
-    Raises CalibrationError where no base can be fitted.
+    Raises:
+        CalibrationError: no base can be fitted.
     """
     corners = np.array([len(view.ids) for view in candidates.detections.views], dtype=float)
     tried: dict[Model, Contender] = {}

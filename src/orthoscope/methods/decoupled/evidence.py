@@ -30,15 +30,23 @@ from orthoscope.models.target_shape import polynomials
 
 __all__ = ["Evidence", "first_guess"]
 
-# of the target's size, the standard deviation of a printed corner to start from; its image, a pixel's tenth,
-# for a lens
-GUESS = 1e-3
-# Of GUESS: a variance that is smaller needs many rounds to grow.
-AWAKE = 0.03
-LEAST, MOST = 1e-6, 0.03  # of the target's size: the range of a standard deviation
-LEAST_BEND, MOST_BEND = 1e-8, 0.1  # of the unit of the distorted plane
-SETTLED = 0.01  # share by which noise and parameters may still change
-SMOOTH = (2, 3, 4)  # orders of the patterns: a pose takes those below, and waves are single corners' matter
+# A printed corner's standard deviation starts from this share of the target's size; for a lens, from its
+# image, a pixel's tenth.
+GUESS_SHARE = 1e-3
+# Below this share of it a variance that is taken over would need many rounds to grow.
+AWAKE_SHARE = 0.03
+# A standard deviation is at least this share of the target's size.
+LEAST_SHARE = 1e-6
+# A standard deviation is at most this share of the target's size.
+MOST_SHARE = 0.03
+# A bend is at least this, in the unit of the distorted plane.
+LEAST_BEND = 1e-8
+# A bend is at most this, in the unit of the distorted plane.
+MOST_BEND = 0.1
+# Noise and parameters may still change by this share.
+SETTLED_SHARE = 0.01
+# The patterns have these orders: a pose takes those below, and waves are single corners' matter.
+SMOOTH_ORDERS = (2, 3, 4)
 PLANE, HEIGHT = slice(None, 2), slice(2, None)
 
 
@@ -47,8 +55,10 @@ class Evidence:
     """Variances: noise, px^2 of a coordinate; surface (2,) in the plane and across, singles (3,), metres^2;
     bend, of the lens's plane.
 
-    size: of the target, metres. likeness: of errors within a view, 1 or more. parameters: how many the data
-    determined, poses left out.
+    Attributes:
+        size: of the target, metres.
+        likeness: of errors within a view, 1 or more.
+        parameters: how many the data determined, poses left out.
     """
 
     noise: float
@@ -73,7 +83,7 @@ class Evidence:
         """With the variances of the target's shape that another fit found, but none so small that it could
         not grow.
         """
-        least = (AWAKE * GUESS * self.size) ** 2
+        least = (AWAKE_SHARE * GUESS_SHARE * self.size) ** 2
         surface, singles = np.maximum(other.surface, least), np.maximum(other.singles, least)
         return replace(
             self,
@@ -95,7 +105,7 @@ class Evidence:
         determined = len(problem.free) + known.spline + float(known.surface.sum() + known.singles.sum())
         freedom = 2 * observations.corners - POSE * len(observations.order) - determined
         noise = (cost - bend_cost - surface_cost - single_cost) / max(freedom, 1.0)
-        low, high = (LEAST * self.size) ** 2, (MOST * self.size) ** 2
+        low, high = (LEAST_SHARE * self.size) ** 2, (MOST_SHARE * self.size) ** 2
         surface = [
             _variance(unknowns.surface[:, part], known.surface[:, part], low, high)
             for part in (PLANE, HEIGHT)
@@ -123,14 +133,14 @@ class Evidence:
         no longer moves.
         """
         return bool(
-            abs(self.noise / other.noise - 1.0) < SETTLED
-            and abs(self.parameters / other.parameters - 1.0) < SETTLED
+            abs(self.noise / other.noise - 1.0) < SETTLED_SHARE
+            and abs(self.parameters / other.parameters - 1.0) < SETTLED_SHARE
         )
 
 
 def first_guess(noise: float, size: float, focal: float) -> Evidence:
     """Where to start from.  noise: px^2 of a coordinate.  size: of the target, metres.  focal: pixels."""
-    corner = (GUESS * size) ** 2
+    corner = (GUESS_SHARE * size) ** 2
     return Evidence(noise, (corner, corner), (corner, corner, corner), (0.1 / focal) ** 2, size)
 
 
@@ -139,7 +149,7 @@ def _likeness(problem: Joint, unknowns: DecoupledEstimate, noise: float) -> floa
     variance would give.
     """
     seen = problem.measurements.observations.present
-    patterns = polynomials(problem.points, seen.max(0) > 0, orders=SMOOTH)
+    patterns = polynomials(problem.points, seen.max(0) > 0, orders=SMOOTH_ORDERS, parts=problem.parts)
     found = np.einsum("pr,mpa->mra", patterns, problem.residuals(unknowns))
     expected = noise * (seen @ patterns**2)
     return max(1.0, float((found**2).sum() / (2.0 * expected.sum())))

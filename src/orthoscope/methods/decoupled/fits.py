@@ -19,8 +19,10 @@ from orthoscope.models.lenses import FREE, lens_name
 
 __all__ = ["fits_of"]
 
-BASES_OF_RICHEST = ("brown", "kannala_brandt", "rational")  # that a free lens may have
-FEWEST_VIEWS = 2  # with fewer, a free lens and a free target have nothing to be told by
+# The richest fit has one of these bases under its free lens.
+RICHEST_BASES = ("brown", "kannala_brandt", "rational")
+# With fewer views a free lens and a free target have nothing to be told by.
+FEWEST_VIEWS = 2
 
 
 def fits_of(calibration: Calibration) -> Fits:
@@ -82,4 +84,4 @@ def _base(calibration: Calibration) -> str:
         return str(base)
     lens = calibration.camera.lens
     name = lens_name(lens.base if isinstance(lens, FreeLens) else lens)
-    return name if name in BASES_OF_RICHEST else "brown"
+    return name if name in RICHEST_BASES else "brown"

@@ -21,10 +21,10 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Compared", "Fitter", "Kept", "some_of"]
 
-# Of so many views, spread as widely as all, the choice is that of all.
+# The choice from so many views, spread as widely as all, is that of all.
 ENOUGH_VIEWS = 40
-# Tolerance of a fit that is compared with others: of squared errors, less than any rule sees.
-JUDGED = 1e-4
+# A fit that is compared with others ends at this tolerance: a share of squared errors that no rule sees.
+COMPARED_TOLERANCE = 1e-4
 
 
 class Fitter(Protocol):
@@ -50,8 +50,10 @@ def some_of(detections: Detections) -> Detections:
 class Compared:
     """Each model from the nearest that was fitted before.
 
-    detections: the views.  skew: whether K has one.  flats: calibrations of a flat target that are there
-    already, by their base.
+    Args:
+        detections: the views.
+        skew: whether K has one.
+        flats: calibrations of a flat target that are there already, by their base.
     """
 
     def __init__(self, detections: Detections, *, skew: bool, flats: Mapping[str, Calibration]) -> None:
@@ -80,7 +82,9 @@ class Compared:
 class Kept:
     """Each model from nothing and to the last digit.
 
-    detections, skew, flats: as of `Compared`.  cold: fits that started from nothing, of `some_of` the views.
+    Args:
+        detections, skew, flats: as of `Compared`.
+        cold: fits that started from nothing, of `some_of` the views.
     """
 
     def __init__(
@@ -122,4 +126,6 @@ def _flats(
 
 
 def _fit(flat: Calibration, model: Model, near: StepOneFit | None) -> StepOneFit:
-    return fit_step_one(flat, shape=model.shape, first_lens=model.first_lens, near=near, tolerance=JUDGED)
+    return fit_step_one(
+        flat, shape=model.shape, first_lens=model.first_lens, near=near, tolerance=COMPARED_TOLERANCE
+    )

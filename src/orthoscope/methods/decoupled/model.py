@@ -14,8 +14,11 @@ JOINT, PAIRS = "joint", "pairs"
 class Model(NamedTuple):
     """One way to explain the photographs.
 
-    base: a formula.  shape: the kind of the target's. first_lens: `free` or `formula`, the lens of step 1.
-    formula: fitted to the pairs of step 1; None where step 1's camera is taken as it is.
+    Attributes:
+        base: a formula.
+        shape: the kind of the target's.
+        first_lens: `free` or `formula`, the lens of step 1.
+        formula: fitted to the pairs of step 1; None where step 1's camera is taken as it is.
     """
 
     base: str

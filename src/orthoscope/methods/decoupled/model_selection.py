@@ -31,9 +31,14 @@ from orthoscope.geometry.arrays import Float, ndarray
 __all__ = ["Contender", "first_as_good", "judged", "richest_unless_worse", "simplest_as_good"]
 
 
-ABOUT, SURELY = 1.0, 2.0  # standard errors of a difference that may be chance, and that is hardly so
-LITTLE = 0.1  # of a squared error, in logarithms: 5 % of an error
-NOTHING = 1e-12  # px^2 of a corner: less is no error at all
+# A difference of so many standard errors may be chance.
+ABOUT_ERRORS = 1.0
+# A difference of so many standard errors is hardly chance.
+SURE_ERRORS = 2.0
+# A change of a squared error's logarithm by this is 5 % of an error.
+LITTLE_LOGARITHM = 0.1
+# A squared error of a corner that is less, px^2, is no error at all.
+NEGLIGIBLE_SQUARE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +46,8 @@ class Contender:
     """A model with the sum of squared held-out residuals of each view (m,), px^2; NaN where the others could
     not tell.
 
-    base, target, lens, fit: as in `Candidate`.
+    Attributes:
+        base, target, lens, fit: as in `Candidate`.
     """
 
     base: str
@@ -55,32 +61,35 @@ def simplest_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " 
     """The index of the first contender that loses no more than one standard error against the best;
     contenders come simplest first.
 
-    corners: of each view.
+    Args:
+        corners: of each view.
     """
-    return _first_within(contenders, corners, ABOUT, np.inf)
+    return _first_within(contenders, corners, ABOUT_ERRORS, np.inf)
 
 
 def first_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " m"]) -> int:
     """The index of the first contender that loses little against the best, and not surely; contenders come in
     order of preference.
 
-    corners: of each view.
+    Args:
+        corners: of each view.
     """
-    return _first_within(contenders, corners, SURELY, LITTLE)
+    return _first_within(contenders, corners, SURE_ERRORS, LITTLE_LOGARITHM)
 
 
 def richest_unless_worse(contenders: Sequence[Contender], corners: Float[ndarray, " m"]) -> int:
     """The index of the last contender, or of the best where that one gains more than two standard errors;
     contenders come simplest first.
 
-    corners: of each view.
+    Args:
+        corners: of each view.
     """
     able = _able(contenders)
     if not able:
         return 0
     best, richest = _best(contenders, corners, able), able[-1]
     loses, error = _difference(contenders[richest], contenders[best], corners)
-    return best if loses > SURELY * error else richest
+    return best if loses > SURE_ERRORS * error else richest
 
 
 def judged(
@@ -138,7 +147,7 @@ def _difference(one: Contender, other: Contender, corners: Float[ndarray, " m"])
 
 def _logarithms(contender: Contender, corners: Float[ndarray, " m"]) -> Float[ndarray, " m"]:
     """Of each view's mean squared error."""
-    return np.log(np.maximum(contender.squares / corners, NOTHING))
+    return np.log(np.maximum(contender.squares / corners, NEGLIGIBLE_SQUARE))
 
 
 def _weighed(values: Float[ndarray, " m"], corners: Float[ndarray, " m"]) -> tuple[float, float]:

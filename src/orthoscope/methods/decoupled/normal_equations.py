@@ -30,6 +30,7 @@ from orthoscope.solve.losses import Linear, Loss
 
 __all__ = ["MeasurementSums", "Measurements", "spline_unknowns"]
 
+# A corner has so many coordinates.
 SPACE = 3
 
 
@@ -37,7 +38,8 @@ class MeasurementSums(NamedTuple):
     """The module's sums: cost, zz (n,n), z (n,), zv (m,n,6), vv (m,6,6), v (m,6), zc (p,n,3), cc (p,3,3), c
     (p,3), vc (m,p,6,3).
 
-    residuals: (m,p,2) predicted minus detected, pixels, not weighted; 0 where a corner was not seen.
+    Attributes:
+        residuals: (m,p,2) predicted minus detected, pixels, not weighted; 0 where a corner was not seen.
     """
 
     cost: float
@@ -61,8 +63,11 @@ def spline_unknowns(camera: Camera) -> int:
 class Measurements:
     """The corners of all views, and what they say at an estimate.
 
-    observations: by corner. camera: of the kind to come. free: its parameters that move. corners_move:
-    whether sums with corners are wanted; they are zero otherwise.
+    Args:
+        observations: by corner.
+        camera: of the kind to come.
+        free: its parameters that move.
+        corners_move: whether sums with corners are wanted; they are zero otherwise.
     """
 
     def __init__(

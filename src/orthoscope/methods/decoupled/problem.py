@@ -28,12 +28,14 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.parameters import Parameters
 from orthoscope.models.spline import Displacement
+from orthoscope.models.target_shape import WHOLE
 from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
 from orthoscope.solve.losses import Loss
 
 __all__ = ["DecoupledEstimate", "Joint", "Known", "Precisions"]
 
-ROUNDING = 1e-13  # of a scaled system: what is added to its diagonal before it is inverted
+# This is added to a scaled system's diagonal before it is inverted.
+ROUNDING_SHARE = 1e-13
 
 
 class DecoupledEstimate(NamedTuple):
@@ -61,7 +63,9 @@ class Known(NamedTuple):
     """Posterior covariance over sigma^2: of the camera's k parameters; the share of each prior's unknowns
     that the data determined.
 
-    spline: a number out of its unknowns.  surface (r,3), singles (p,3): each between 0 and 1.
+    Attributes:
+        spline: a number out of its unknowns.
+        surface (r,3), singles (p,3): each between 0 and 1.
     """
 
     camera: ndarray
@@ -73,8 +77,12 @@ class Known(NamedTuple):
 class Joint:
     """The problem for given measurements.
 
-    points: (p,3) nominal corners. surface: (p,r) what its coefficients multiply. energy: (g,g) of the
-    displacement, or none. single: whether corners have displacements of their own.
+    Args:
+        points: (p,3) nominal corners.
+        surface: (p,r) what its coefficients multiply.
+        energy: (g,g) of the displacement, or none.
+        single: whether corners have displacements of their own.
+        parts: which corners are of one body.
     """
 
     def __init__(
@@ -87,8 +95,10 @@ class Joint:
         energy: Float[ndarray, "g g"],
         single: bool,
         precisions: Precisions,
+        parts: Sequence[slice] = WHOLE,
     ) -> None:
         self.measurements, self.points, self.free = measurements, points, tuple(free)
+        self.parts = tuple(parts)
         self.surface, self.energy, self.single, self.precisions = surface, energy, single, precisions
         self._n = len(free) + 2 * len(energy) + SPACE * surface.shape[1]
         views = len(measurements.observations.order)
@@ -242,5 +252,5 @@ def _inverse(matrix: Float[ndarray, "n n"]) -> Float[ndarray, "n n"]:
     """Of a symmetric positive system, whatever its units."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix * scale * scale[:, None]
-    scaled[np.diag_indices_from(scaled)] += ROUNDING
+    scaled[np.diag_indices_from(scaled)] += ROUNDING_SHARE
     return np.linalg.inv(scaled) * scale * scale[:, None]

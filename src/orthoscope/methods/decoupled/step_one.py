@@ -27,24 +27,28 @@ from orthoscope.models.target_shape import TargetShape, polynomials, without_sim
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Huber
 
-__all__ = ["FINE", "FORMULA", "StepOneFit", "fit_step_one", "polished"]
+__all__ = ["FORMULA", "LAST_TOLERANCE", "StepOneFit", "fit_step_one", "polished"]
 
-# beside FREE: the lens of step 1: a displacement over a formula, or the formula alone
+# Beside FREE, a displacement over a formula, step 1's lens may be the formula alone, by this name.
 FORMULA = "formula"
 
-ROUNDS = 6
-COARSE, FINE = 1e-3, 1e-9  # tolerances of a round and of the last
-# standard deviations of a coordinate: independent errors reach so far once in 3000, and count less
-# beyond
-FAR = 4.0
-LOSS_KEEPS = (
-    0.05  # share by which noise may change before the loss does: its sums then need not be formed again
-)
-CELLS = 8  # of the displacement's lattice along the image's longer side
-MARGIN = 0.05  # of the image's sides, by which the lattice is larger
-# of the image's half diagonal: the range of the displacement's prior; from half to twice this the
-# held-out error is the same
-REACH = 0.67
+# Step 1 has at most so many rounds.
+ROUND_LIMIT = 6
+# A round ends at this tolerance.
+ROUND_TOLERANCE = 1e-3
+# The last round ends at this tolerance.
+LAST_TOLERANCE = 1e-9
+# Independent errors reach so many standard deviations of a coordinate once in 3000, and count less beyond.
+FAR_DEVIATIONS = 4.0
+# Noise may change by this share before the loss does: its sums then need not be formed again.
+KEPT_LOSS_SHARE = 0.05
+# The displacement's lattice has so many cells along the image's longer side.
+CELLS_ALONG_SIDE = 8
+# The lattice is larger than the image by this share of its sides.
+MARGIN_SHARE = 0.05
+# The displacement's prior ranges over this share of the image's half diagonal; from half to twice this the
+# held-out error is the same.
+REACH_SHARE = 0.67
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +56,9 @@ class StepOneFit:
     """What came out: the kind of the target's shape, the problem with its last weights, the estimate and what
     it speaks for.
 
-    covariance: (k,k) of the free parameters.  steps, status: of the solver.
+    Attributes:
+        covariance: (k,k) of the free parameters.
+        steps, status: of the solver.
     """
 
     target: str
@@ -90,6 +96,7 @@ class StepOneFit:
             energy=np.zeros((0, 0)),
             single=problem.single,
             precisions=problem.precisions,
+            parts=problem.parts,
         )  # fmt: skip
         known = other.known(other.linearise(self.estimate._replace(camera=camera), self.loss))
         return len(free) + float(known.surface.sum() + known.singles.sum())
@@ -101,9 +108,8 @@ class StepOneFit:
         if self.target == "flat":
             return TargetShape.flat(len(points))
         seen = self.problem.measurements.observations.present.max(0) > 0
-        return TargetShape(
-            self.target, without_similarity(points, self.problem.corners(self.estimate) - points, seen)
-        )
+        moved = self.problem.corners(self.estimate) - points
+        return TargetShape(self.target, without_similarity(points, moved, seen, parts=self.problem.parts))
 
 
 def fit_step_one(
@@ -112,7 +118,7 @@ def fit_step_one(
     shape: str,
     first_lens: str,
     near: StepOneFit | None = None,
-    tolerance: float = FINE,
+    tolerance: float = LAST_TOLERANCE,
 ) -> StepOneFit:
     """Camera, poses and shape together.
 
@@ -127,7 +133,8 @@ def fit_step_one(
     detections, free = flat.detections, flat.uncertainty.names
     observations = Observations.by_corner(detections)
     points, seen = detections.target.points, observations.present.max(0) > 0
-    basis = polynomials(points, seen) if shape != "flat" else np.zeros((len(points), 0))
+    parts = detections.target.parts
+    basis = polynomials(points, seen, parts=parts) if shape != "flat" else np.zeros((len(points), 0))
     start = Start(
         DecoupledEstimate(
             _with_displacement(flat.camera) if first_lens == FREE else flat.camera,
@@ -146,8 +153,8 @@ def fit_step_one(
     measurements = Measurements(observations, estimate.camera, free, corners_move=shape != "flat")
     noise, loss = evidence.noise, _loss(evidence.noise)
     steps, settled = 0, False
-    for round_ in range(ROUNDS):
-        last = settled or round_ == ROUNDS - 1
+    for round_ in range(ROUND_LIMIT):
+        last = settled or round_ == ROUND_LIMIT - 1
         precisions = evidence.precisions(basis.shape[1])
         problem = Joint(
             measurements,
@@ -157,9 +164,10 @@ def fit_step_one(
             energy=energy,
             single=shape == "free",
             precisions=precisions,
+            parts=parts,
         )
-        options = Options(tolerance=tolerance if last else COARSE, max_steps=50)
-        if abs(evidence.noise / noise - 1.0) > LOSS_KEEPS:
+        options = Options(tolerance=tolerance if last else ROUND_TOLERANCE, max_steps=50)
+        if abs(evidence.noise / noise - 1.0) > KEPT_LOSS_SHARE:
             noise, loss = evidence.noise, _loss(evidence.noise)
         solution = solve(problem, estimate, loss=loss, options=options)
         estimate, steps = solution.unknowns, steps + solution.steps
@@ -176,7 +184,9 @@ def fit_step_one(
 
 def polished(fit: StepOneFit) -> StepOneFit:
     """A fit that was stopped early brought to its minimum, weights as they are."""
-    solution = solve(fit.problem, fit.estimate, loss=fit.loss, options=Options(tolerance=FINE, max_steps=50))
+    solution = solve(
+        fit.problem, fit.estimate, loss=fit.loss, options=Options(tolerance=LAST_TOLERANCE, max_steps=50)
+    )
     known = fit.problem.known(solution.sums)
     evidence = fit.evidence.renewed(fit.problem, solution.unknowns, solution.cost, known)
     return replace(
@@ -191,7 +201,7 @@ def polished(fit: StepOneFit) -> StepOneFit:
 
 def _loss(noise: float) -> Huber:
     """noise: px^2 of a coordinate."""
-    return Huber(FAR * float(np.sqrt(noise)))
+    return Huber(FAR_DEVIATIONS * float(np.sqrt(noise)))
 
 
 def _with_displacement(camera: Camera) -> Camera:
@@ -199,10 +209,18 @@ def _with_displacement(camera: Camera) -> Camera:
     frame = camera.lens_frame or camera.intrinsics
     width, height = camera.image_size
     low, high = frame.to_plane(
-        np.array([[-MARGIN * width, -MARGIN * height], [(1 + MARGIN) * width, (1 + MARGIN) * height]])
+        np.array(
+            [
+                [-MARGIN_SHARE * width, -MARGIN_SHARE * height],
+                [(1 + MARGIN_SHARE) * width, (1 + MARGIN_SHARE) * height],
+            ]
+        )
     )
     longer = max(width, height)
-    cells = (max(1, round(CELLS * width / longer)), max(1, round(CELLS * height / longer)))
+    cells = (
+        max(1, round(CELLS_ALONG_SIDE * width / longer)),
+        max(1, round(CELLS_ALONG_SIDE * height / longer)),
+    )
     lattice = Lattice.over(low, high, cells)
     return replace(camera, lens=FreeLens(camera.lens, Displacement(lattice, np.zeros((lattice.splines, 2)))))
 
@@ -212,4 +230,4 @@ def _energy(camera: Camera) -> Float[ndarray, "g g"]:
         return np.zeros((0, 0))
     lattice = camera.lens.over.lattice
     sides = lattice.step * (np.array(lattice.shape) - 3)
-    return lattice.energy(REACH * 0.5 * float(np.hypot(*sides)))
+    return lattice.energy(REACH_SHARE * 0.5 * float(np.hypot(*sides)))

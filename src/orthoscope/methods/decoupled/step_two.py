@@ -42,8 +42,11 @@ def formula_from_pairs(fit: StepOneFit, lens: str) -> tuple[Camera, tuple[str, .
     """The camera with a formula, such as `brown` or `rational:k1,k4`, that best takes each corrected corner
     to its pixel.
 
-    Also the names of the parameters that were fitted. Raises CalibrationError where the formula cannot see
-    that far from the axis, InputError for a lens that is none.
+    Also the names of the parameters that were fitted.
+
+    Raises:
+        CalibrationError: the formula cannot see that far from the axis.
+        InputError: a lens that is none.
     """
     kind, coefficients = parse_lens(lens)
     free = (*Parameters.of(fit.problem.free).only(INTRINSICS).names, *coefficients)
@@ -61,7 +64,8 @@ def formula_from_pairs(fit: StepOneFit, lens: str) -> tuple[Camera, tuple[str, .
 def nearest_formula(camera: Camera, rays: Float[ndarray, "n 3"], among: Sequence[str]) -> Camera:
     """The camera with the formula of `among` whose image of the rays is nearest to this camera's, in pixels.
 
-    Raises CalibrationError where none sees all the rays.
+    Raises:
+        CalibrationError: none sees all the rays.
     """
     wanted = camera.project(rays)
     near: list[tuple[float, Camera]] = []

@@ -61,7 +61,8 @@ class Terms(NamedTuple):
 class Eq7:
     """The problem of eq. (7); weights: of J_PH, J_CR and J_ST.
 
-    Raises InputError for weights that leave the points free.
+    Raises:
+        InputError: weights that leave the points free.
     """
 
     def __init__(

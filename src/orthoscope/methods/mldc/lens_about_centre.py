@@ -71,7 +71,8 @@ def parse_centred_lens(text: str) -> tuple[type[Formula], tuple[str, ...]]:
     """As `parse_lens`, for a lens with a centre of its own: `auto` is the paper's `pfet`, and only radial
     coefficients are free by default.
 
-    Raises InputError where `parse_lens` does.
+    Raises:
+        InputError: as `parse_lens` does.
     """
     kind, free = parse_lens("pfet" if text == "auto" else text)
     return kind, free if ":" in text else tuple(name for name in free if name not in OFF_CENTRE)
@@ -101,24 +102,33 @@ def fit_centred_lens(
     *,
     pinhole: Camera,
     lens: str = "pfet",
+    centre: tuple[float, float] | None = None,
     loss: Loss | None = None,
     options: Options | None = None,
 ) -> Solution[Camera]:
     """The camera with this pin-hole whose lens best takes each ray to its pixel: the paper's section 3.2, for
     any lens.
 
-    rays: any length. pinhole: its K says where they are seen straight; the lens it has does not matter. lens:
-    as `parse_centred_lens` reads it. The centre starts at the principal point, s is K's mean focal length,
-    coefficients start in closed form for `pfet` (eq. 10), for others where the formula says. Least squares
-    are over both coordinates of a pixel; eq. (9) has the radial one alone, since eq. (2) says that there is
-    no other, but where the centre is not known yet there is. Raises CalibrationError where the formula cannot
-    see these rays, InputError for a lens that is none.
+    The centre starts at the principal point, s is K's mean focal length, coefficients start in closed form
+    for `pfet` (eq. 10), for others where the formula says. Least squares are over both coordinates of a
+    pixel; eq. (9) has the radial one alone, since eq. (2) says that there is no other, but where the centre
+    is not known yet there is.
+
+    Args:
+        rays: any length.
+        pinhole: its K says where they are seen straight; the lens it has does not matter.
+        lens: as `parse_centred_lens` reads it.
+        centre: of distortion where it is known, pixels; it is found else.
+    Raises:
+        CalibrationError: the formula cannot see these rays.
+        InputError: a lens that is none.
     """
     kind, coefficients = parse_centred_lens(lens)
     free = paired_parameters(kind, coefficients)
     K = pinhole.intrinsics
     focal = 0.5 * (K.fx + K.fy)
-    camera = replace(pinhole, lens_frame=Intrinsics(focal, focal, K.cx, K.cy))
+    free = free if centre is None else tuple(name for name in free if name not in CENTRE)
+    camera = replace(pinhole, lens_frame=Intrinsics(focal, focal, *(centre or (K.cx, K.cy))))
     lenses = (
         [_closed_form(rays, pixels, camera, free)]
         if kind is Pfet

@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from orthoscope.fitting.initial_camera import FIELDS
+from orthoscope.fitting.initial_camera import FIELDS_OF_VIEW
 from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, straightened_parameters
@@ -32,14 +33,20 @@ from orthoscope.solve.least_squares import Options, Solution, shared_covariance,
 from orthoscope.solve.losses import Cauchy, Linear, Loss
 from orthoscope.targets.target import Target
 
-__all__ = ["MEASURES", "StraightLens", "fit_straight_lens"]
+__all__ = ["MEASURES", "StraightLens", "fit_straight_lens", "lens_of_lines"]
 
-TRIED = 3  # starts that are followed to their end
-FORGIVING = 0.002  # of the longer side: errors beyond this hardly count in the first fit
-NOISE = 0.1  # px: corners are never taken to be better than this when asking whether they tell the centre
-VAGUE = 0.1  # of the diagonal: a centre less certain than this is not known
-EQUAL = 0.01  # costs that differ by less than this share are as good as one another
-PROBED = 50  # steps that the scale of a lens of the angle is given to show that it matters
+# So many starts are followed to their end.
+STARTS_TRIED = 3
+# Errors beyond this share of the longer side hardly count in the first fit.
+FORGIVING_SHARE = 0.002
+# Corners are never taken to be better than this, pixels, when asking whether they tell the centre.
+LEAST_NOISE_PX = 0.1
+# A centre less certain than this share of the diagonal is not known.
+VAGUE_SHARE = 0.1
+# Costs that differ by less than this share are as good as one another.
+EQUAL_SHARE = 0.01
+# The scale of a lens of the angle is given so many steps to show that it matters.
+PROBING_STEPS = 50
 
 SCALE = "frame_scale"
 OWN_NAMES = {
@@ -52,7 +59,7 @@ OWN_NAMES = {
 Lines = Any  # Straightness or StraightenedLines, each with unknowns of its own that have a `camera`
 # Where the distance of a corner from its line is measured.
 MEASURES: dict[str, Callable[[Observations, SeenLines, tuple[str, ...]], Lines]] = {
-    "photograph": Straightness,
+    "photograph": Straightness.of,
     "straight-image": StraightenedLines,
 }
 
@@ -86,16 +93,55 @@ def fit_straight_lens(
 ) -> StraightLens:
     """The lens, about a centre of its own, that makes the lines straightest, by least squares.
 
-    measure: of MEASURES, where distances are measured. Raises CalibrationError where the lines say too little
-        for so many coefficients, or the lens cannot see
-    the corners.
+    Args:
+        measure: of MEASURES, where distances are measured.
+    Raises:
+        CalibrationError: the lines say too little for so many coefficients, or the lens cannot see the
+            corners.
     """
     lines = SeenLines.of(observations, target)
+    return lens_of_lines(
+        partial(MEASURES[measure], observations, lines),
+        image_size,
+        lens,
+        coefficients,
+        measure=measure,
+        loss=loss,
+        options=options,
+    )
+
+
+def lens_of_lines(
+    problem_of: Callable[[tuple[str, ...]], Lines],
+    image_size: tuple[int, int],
+    lens: type[Formula],
+    coefficients: tuple[str, ...],
+    *,
+    measure: str,
+    loss: Loss,
+    options: Options,
+    centre: bool = True,
+) -> StraightLens:
+    """The same for lines of any kind.
+
+    Args:
+        problem_of: the straightness of the lines over these parameters of the lens's own camera.
+        image_size: (width, height) pixels.
+        lens: the formula.
+        coefficients: those to free.
+        measure: of MEASURES, where distances are measured.
+        loss: how large errors count.
+        options: of the solver.
+        centre: whether the lens has a centre of its own; it stands at the image's else.
+    Raises:
+        CalibrationError: as `fit_straight_lens`.
+    """
 
     def problem(free: tuple[str, ...]) -> Lines:
-        return MEASURES[measure](observations, lines, tuple(OWN_NAMES.get(name, name) for name in free))
+        return problem_of(tuple(OWN_NAMES.get(name, name) for name in free))
 
     free = straightened_parameters(lens, coefficients)
+    free = free if centre else tuple(name for name in free if name not in CENTRE)
     shape = tuple(name for name in free if name not in CENTRE)
     starts = _likeliest(problem(free), image_size, lens)
     straight = _result(
@@ -137,9 +183,9 @@ def _with_scale(straight: StraightLens, problem: Lines, loss: Loss, options: Opt
         problem,
         straight.solution.unknowns,
         loss=loss,
-        options=replace(options, max_steps=min(PROBED, options.max_steps)),
+        options=replace(options, max_steps=min(PROBING_STEPS, options.max_steps)),
     )
-    if not tried.cost < (1.0 - EQUAL) * straight.solution.cost:
+    if not tried.cost < (1.0 - EQUAL_SHARE) * straight.solution.cost:
         return straight
     found = solve(problem, tried.unknowns, loss=loss, options=options)
     return _result(problem, (*straight.free, SCALE), found)._replace(assumptions=straight.assumptions)
@@ -147,7 +193,7 @@ def _with_scale(straight: StraightLens, problem: Lines, loss: Loss, options: Opt
 
 def _followed(problem: Lines, held: Lines, start: Camera, loss: Loss, options: Options) -> Solution[Any]:
     """Coefficients first, with the centre held, then all."""
-    forgiving, rough = Cauchy(FORGIVING * max(start.image_size)), Options(max_steps=30, tolerance=1e-4)
+    forgiving, rough = Cauchy(FORGIVING_SHARE * max(start.image_size)), Options(max_steps=30, tolerance=1e-4)
     return solve(
         problem,
         solve(held, held.start(start), loss=forgiving, options=rough).unknowns,
@@ -159,12 +205,14 @@ def _followed(problem: Lines, held: Lines, start: Camera, loss: Loss, options: O
 def _best(solutions: list[Solution[Any]]) -> Solution[Any]:
     """The likeliest start's, unless another's cost is really lower."""
     least = min(solution.cost for solution in solutions)
-    return next(solution for solution in solutions if solution.cost <= (1.0 + EQUAL) * least)
+    return next(solution for solution in solutions if solution.cost <= (1.0 + EQUAL_SHARE) * least)
 
 
 def _likeliest(problem: Lines, image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
-    """The starts under which the lines are least bent as they are, the best first; raises CalibrationError as
-    `fit_straight_lens` does.
+    """The starts under which the lines are least bent as they are, the best first.
+
+    Raises:
+        CalibrationError: as `fit_straight_lens` does.
     """
     _check_enough(problem)
     cameras = _starts(image_size, lens)
@@ -175,7 +223,7 @@ def _likeliest(problem: Lines, image_size: tuple[int, int], lens: type[Formula])
             f"the lens {lens.__name__} cannot see as far from its axis as these corners are. "
             "Use a lens of the angle: --lens kannala_brandt."
         )
-    return [cameras[i] for i in usable[np.argsort(bent[usable], kind="stable")][:TRIED]]
+    return [cameras[i] for i in usable[np.argsort(bent[usable], kind="stable")][:STARTS_TRIED]]
 
 
 def _starts(image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
@@ -184,7 +232,7 @@ def _starts(image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
     """
     width, height = image_size
     diagonal = float(np.hypot(width, height))
-    scales = diagonal / FIELDS if lens.chart is EQUIDISTANT else (float(max(image_size)),)
+    scales = diagonal / FIELDS_OF_VIEW if lens.chart is EQUIDISTANT else (float(max(image_size)),)
     return [
         Camera(
             image_size, Intrinsics(scale, scale, 0.5 * (width - 1), 0.5 * (height - 1)), lens(**coefficients)
@@ -195,7 +243,11 @@ def _starts(image_size: tuple[int, int], lens: type[Formula]) -> list[Camera]:
 
 
 def _check_enough(problem: Lines) -> None:
-    """Raises CalibrationError where each line could be met by bending the lens."""
+    """Check that not each line could be met by bending the lens.
+
+    Raises:
+        CalibrationError: it could.
+    """
     said, unknowns = problem.measurements - 2 * problem.lines, len(problem.free)
     if said < unknowns:
         raise CalibrationError(
@@ -213,10 +265,10 @@ def _tells_centre(straight: StraightLens, problem: Lines) -> bool:
         straight.solution.cost / max(problem.measurements - 2 * problem.lines - len(straight.free), 1)
     )
     deviation = np.sqrt(np.diag(straight.covariance)[at].max(initial=0.0)) * max(
-        1.0, NOISE / max(sigma, 1e-150)
+        1.0, LEAST_NOISE_PX / max(sigma, 1e-150)
     )
     return (
         0 <= K.cx <= width - 1
         and 0 <= K.cy <= height - 1
-        and bool(deviation < VAGUE * np.hypot(width, height))
+        and bool(deviation < VAGUE_SHARE * np.hypot(width, height))
     )

@@ -21,12 +21,12 @@ curve itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from orthoscope.fitting.observations import Observations
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.models.camera import Camera
@@ -36,12 +36,15 @@ from orthoscope.solve.losses import Loss
 
 __all__ = ["LinesOfSight", "Straightness"]
 
-FEET = (
-    8  # steps towards a foot; each gains as many digits as the distance is short against the curve's radius
-)
-SETTLED = 1e-12  # radians: a foot that moves less has been found
-NOTHING = Parameters(())
-STRIDE = 0.3  # radians: a foot never moves farther at once
+# A foot is given so many steps; each gains as many digits as the distance is short against the curve's
+# radius.
+FOOT_STEPS = 8
+# A foot that moves less, radians, has been found.
+SETTLED_STEP = 1e-12
+# Nothing of a camera is moved.
+NO_PARAMETERS = Parameters(())
+# A foot never moves farther at once than this, radians.
+LONGEST_STRIDE = 0.3
 
 
 class LinesOfSight(NamedTuple):
@@ -61,14 +64,26 @@ class Straightness:
     Corners stand one line after the other; one that lies on a row and a column stands twice.
     """
 
-    def __init__(self, observations: Observations, lines: SeenLines, free: Sequence[str]) -> None:
-        line, place = np.nonzero(lines.present)
+    def __init__(self, pixels: Float[ndarray, "2 n"], line: Int[ndarray, " n"], free: Sequence[str]) -> None:
+        """The problem for points of lines.
+
+        Args:
+            pixels: one line after the other.
+            line: the number of each one's line, from 0 up without gaps.
+            free: parameters of the lens's own camera.
+        """
         self.parameters = Parameters.of(free)
         self.free = self.parameters.names
         self._line = line
-        self._first = np.searchsorted(line, np.arange(len(lines.row)))
+        self._first = np.searchsorted(line, np.arange(line[-1] + 1))
+        self.pixels = pixels
+
+    @classmethod
+    def of(cls, observations: Observations, lines: SeenLines, free: Sequence[str]) -> Self:
+        """The problem for the rows and columns of a target."""
+        line, place = np.nonzero(lines.present)
         row, column = lines.row[line], lines.column[line, place]
-        self.pixels = np.stack([observations.u[row, column], observations.v[row, column]])
+        return cls(np.stack([observations.u[row, column], observations.v[row, column]]), line, free)
 
     @property
     def measurements(self) -> int:
@@ -127,12 +142,14 @@ class Straightness:
 
     def _with_feet(self, unknowns: LinesOfSight) -> LinesOfSight:
         """The same with every foot moved to the place of its curve nearest to its corner."""
-        for _ in range(FEET):
+        for _ in range(FOOT_STEPS):
             with np.errstate(all="ignore"):
                 pixels, along, *_ = self._curve(unknowns)
                 step = (along * (pixels - self.pixels)).sum(0) / (along * along).sum(0)
-                unknowns = unknowns._replace(feet=unknowns.feet - np.clip(step, -STRIDE, STRIDE))
-            if not np.abs(step).max() > SETTLED:
+                unknowns = unknowns._replace(
+                    feet=unknowns.feet - np.clip(step, -LONGEST_STRIDE, LONGEST_STRIDE)
+                )
+            if not np.abs(step).max() > SETTLED_STEP:
                 break
         return unknowns
 
@@ -145,7 +162,7 @@ class Straightness:
         return a * cosine + b * sine, b * cosine - a * sine, n
 
     def _curve(
-        self, unknowns: LinesOfSight, parameters: Parameters = NOTHING
+        self, unknowns: LinesOfSight, parameters: Parameters = NO_PARAMETERS
     ) -> tuple[Float[ndarray, "2 n"], Float[ndarray, "2 n"], Float[ndarray, "2 n"], Float[ndarray, "k 2 n"]]:
         """Pixels of the feet, their slopes along the curve, when P moves along the line's normal, by the
         parameters.

@@ -14,16 +14,19 @@ from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import Bool, CalibrationError, Int, ndarray
 from orthoscope.targets.target import Target
 
-__all__ = ["FEWEST", "SeenLines"]
+__all__ = ["FEWEST_CORNERS", "SeenLines"]
 
-FEWEST = 3  # corners of a line that says something: any two lie on one
+# A line that says something has at least this many corners, since any two lie on one.
+FEWEST_CORNERS = 3
 
 
 class SeenLines(NamedTuple):
-    """Lines with at least FEWEST seen corners, padded to one length.
+    """Lines with at least FEWEST_CORNERS seen corners, padded to one length.
 
-    row: (l,) of the observations' table. column: (l, w) of the table, its corners in the target's order.
-    present: (l, w); padding comes last, its column is 0.
+    Attributes:
+        row: (l,) of the observations' table.
+        column: (l, w) of the table, its corners in the target's order.
+        present: (l, w); padding comes last, its column is 0.
     """
 
     row: Int[ndarray, " l"]
@@ -34,17 +37,19 @@ class SeenLines(NamedTuple):
     def of(cls, observations: Observations, target: Target) -> Self:
         """The lines of every view.
 
-        Raises CalibrationError where no view shows FEWEST corners of a line.
+        Raises:
+            CalibrationError: no view shows FEWEST_CORNERS corners of a line.
         """
         on_line = _padded(target.lines, len(target.points))
         column = _column_of(observations, len(target.points))[
             :, on_line
         ]  # (views, lines, places), -1 where not seen
-        row, line = np.nonzero((column >= 0).sum(-1) >= FEWEST)
+        row, line = np.nonzero((column >= 0).sum(-1) >= FEWEST_CORNERS)
         if not len(row):
             raise CalibrationError(
-                f"no photograph shows {FEWEST} corners of a row or column of {target.name}; straightness"
-                " cannot be judged without. Use a target with rows and columns, photographed whole."
+                f"no photograph shows {FEWEST_CORNERS} corners of a row or column of {target.name};"
+                " straightness cannot be judged without. Use a target with rows and columns,"
+                " photographed whole."
             )
         column = column[row, line]
         place = np.argsort(column < 0, axis=-1, kind="stable")  # the seen ones first, in their order

@@ -56,12 +56,12 @@ from orthoscope.version import __version__
 
 __all__ = ["mldc"]
 
-# px^2: a step that promises less ends the search of eq. (7), the points then "satisfy all template
-# restrictions perfectly"
-PERFECT = 1e-13
-# times what the full calibration leaves, rms: more is a wrong minimum, or a formula that cannot follow the
-# lens
-WRONG = 1.3
+# A step that promises less, px^2, ends the search of eq. (7): the points then "satisfy all template
+# restrictions perfectly".
+COST_FLOOR = 1e-13
+# An rms that is more than this many times what the full calibration leaves is a wrong minimum, or a formula
+# that cannot follow the lens.
+WRONG_RATIO = 1.3
 NO_CLOSED_FORM = "a camera with a lens that was fitted to the corners, which have no closed form,"
 
 
@@ -211,7 +211,7 @@ def _literal(bases: StartingCameras, used: Detections, search: Search) -> Found:
     start = pinhole_start(bases)
     problem = Eq7(bases.observations, used.target, bases.narrowing.free, weights=search.weights)
     options = Options(
-        search.max_steps, floor=PERFECT, damping=search.damping, damp=search.damp, progress=search.progress
+        search.max_steps, floor=COST_FLOOR, damping=search.damping, damp=search.damp, progress=search.progress
     )
     solution = solve(problem, problem.start(start, bases.observations), options=options)
     where = "Zhang's closed form" if bases.pinhole is not None else NO_CLOSED_FORM
@@ -241,7 +241,7 @@ def _repeated(bases: StartingCameras, used: Detections, search: Search) -> Found
         )
 
     found, usual = rounds(staged=False), _usual_cost(used, search)
-    if not found.ended.settled or found.folds or found.cost > WRONG**2 * usual:
+    if not found.ended.settled or found.folds or found.cost > WRONG_RATIO**2 * usual:
         with suppress(CalibrationError):
             found = min((found, rounds(staged=True)), key=lambda ended: (ended.folds, ended.cost))
     free = joint_parameters(bases.narrowing.free, search.lens).names
@@ -263,7 +263,7 @@ def _repeated(bases: StartingCameras, used: Detections, search: Search) -> Found
             " else. Free fewer coefficients, as in --lens pfet:a1,a3, or take a lens of the angle, --lens"
             " kannala_brandt"
         )
-    if found.cost > WRONG**2 * usual:
+    if found.cost > WRONG_RATIO**2 * usual:
         said.append(
             f"the corners are missed by {np.sqrt(found.cost / usual):.1f} times what the full calibration"
             " leaves: a"

@@ -32,7 +32,7 @@ from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
 from orthoscope.methods.mldc.lens_from_lines import MEASURES, StraightLens, fit_straight_lens
-from orthoscope.models.camera import WIDEST, Camera
+from orthoscope.models.camera import WIDEST_ANGLE, Camera
 from orthoscope.models.lenses import lens_name
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance
 from orthoscope.solve.losses import LOSSES, Linear
@@ -41,11 +41,13 @@ from orthoscope.version import __version__
 
 __all__ = ["nmldc"]
 
-# of the cost: of ten thousand residuals that is a hundredth of their variance, and no step is worth while for
-# less
-SETTLED = 1e-6
-EXACT = 1e-14  # px^2: nor is it for less than this (noise-free corners)
-NEARBY = 1e-3  # px: what a lens that is a little off moves the lines by
+# Of ten thousand residuals' cost this share is a hundredth of their variance, and no step is worth while for
+# less.
+COST_TOLERANCE = 1e-6
+# No step is worth while for less than this, px^2 (noise-free corners).
+COST_FLOOR = 1e-14
+# A lens that is a little off moves the lines by this, pixels.
+NEARBY_PX = 1e-3
 
 
 @with_one_thread
@@ -89,7 +91,7 @@ def nmldc(
     used = with_usable_views(detections)
     kind, coefficients = parse_centred_lens(lens)
     weighing, options = LOSSES[loss](loss_scale), Options(max_steps=max_steps, progress=progress)
-    roughly = replace(options, tolerance=SETTLED, floor=EXACT)
+    roughly = replace(options, tolerance=COST_TOLERANCE, floor=COST_FLOOR)
     bent = fit_straight_lens(
         Observations.of(used),
         used.target,
@@ -134,7 +136,11 @@ def nmldc(
 
 
 def _check_sees(camera: Camera, camera_from_target: Sequence[Pose], detections: Detections) -> None:
-    """Raises CalibrationError where the lens has no image of corners that it was to be fitted to."""
+    """Check that the lens has an image of all corners that it was to be fitted to.
+
+    Raises:
+        CalibrationError: it has none of some.
+    """
     residuals = np.concatenate(residuals_of(camera, camera_from_target, detections))
     if lost := int(np.isnan(residuals[:, 0]).sum()):
         raise CalibrationError(
@@ -145,14 +151,15 @@ def _check_sees(camera: Camera, camera_from_target: Sequence[Pose], detections: 
 
 
 def _within_reach(detections: Detections, own: Camera) -> Detections:
-    """The corners that a straight image can hold: within WIDEST of the lens's axis. Views that have too few
-    of them are set aside.
+    """The corners that a straight image can hold: within WIDEST_ANGLE of the lens's axis. Views that have too
+    few of them are set aside.
 
-    Raises CalibrationError where no view is left.
+    Raises:
+        CalibrationError: no view is left.
     """
 
     def kept(view: View) -> View:
-        seen = own.unproject(view.pixels)[:, 2] > np.cos(WIDEST)
+        seen = own.unproject(view.pixels)[:, 2] > np.cos(WIDEST_ANGLE)
         return View(view.image, view.ids[seen], view.pixels[seen])
 
     return with_usable_views(replace(detections, views=tuple(kept(view) for view in detections.views)))
@@ -173,7 +180,8 @@ def _bases(
 ) -> StartingCameras:
     """The corners as the lens's own camera would see them without its lens, ready for the pin-hole.
 
-    fallback: the camera for corners that the first does not reach.
+    Args:
+        fallback: the camera for corners that the first does not reach.
     """
 
     def straight(view: View) -> View:
@@ -226,7 +234,7 @@ def _pinhole_by_lens(
         eliminated = sums.A - (of_poses @ sums.B.transpose(0, 2, 1)).sum(0)
         return -np.linalg.solve(eliminated, sums.a - (of_poses @ sums.c[:, :, None]).sum(0)[:, 0])
 
-    little = np.diag(NEARBY / np.sqrt(np.diag(bent.solution.sums.A) / within.corners))
+    little = np.diag(NEARBY_PX / np.sqrt(np.diag(bent.solution.sums.A) / within.corners))
     moved = [bent.free.index(name) for name in names]
     slopes = [(step_of(little[i]) - step_of(-little[i])) / (2.0 * little[i, i]) for i in moved]
     return np.array(slopes).reshape(len(names), len(bases.narrowing.free)).T

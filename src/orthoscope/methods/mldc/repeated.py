@@ -50,14 +50,15 @@ from orthoscope.solve.losses import Loss
 
 __all__ = ["Ended", "Rounds", "joint_parameters", "repeat"]
 
-# px rms over the corners: what a round moves, and what is still to go, where nothing changes any more
-SETTLED = 1e-6
-SHORTER = (1.0, 0.25, 0.0625)  # shares of the predicted way that are tried in turn
-# Of a step within a round: it starts where the last one ended, and stops where numbers do.
-INNER = Options(max_steps=4, tolerance=1e-16)
-# Coefficients of the paper's polynomial that a staged start frees, after one another, and the rounds given to
-# each.
+# Where a round moves corners by less, and less is still to go, px rms, nothing changes any more.
+SETTLED_PX = 1e-6
+# These shares of the predicted way are tried in turn.
+WAY_SHARES = (1.0, 0.25, 0.0625)
+# A step within a round starts where the last one ended, and stops where numbers do.
+INNER_OPTIONS = Options(max_steps=4, tolerance=1e-16)
+# A staged start frees these coefficients of the paper's polynomial, after one another.
 STAGES: tuple[tuple[str, ...], ...] = (("a3",), ("a3", "a5"))
+# Each stage is given so many rounds.
 STAGED_ROUNDS = 8
 
 
@@ -79,7 +80,7 @@ class Ended(NamedTuple):
     @property
     def settled(self) -> bool:
         """Whether nothing changes any more."""
-        return self.moved_px < SETTLED and self.way_px < SETTLED
+        return self.moved_px < SETTLED_PX and self.way_px < SETTLED_PX
 
     @property
     def status(self) -> str:
@@ -117,9 +118,9 @@ def joint_parameters(of_pinhole: Sequence[str], lens: str) -> Parameters:
     """All that the two steps find: K's parameters, the lens's coefficients but for the gauge, and the"
     " centre."""
     kind, coefficients = parse_centred_lens(lens)
-    shape = tuple(name for name in coefficients if name != GAUGE.get(kind))
+    held = ("stretch", GAUGE.get(kind))
     return Parameters.of(
-        (*of_pinhole, *shape, *(CENTRE if CENTRE[0] in paired_parameters(kind, coefficients) else ()))
+        (*of_pinhole, *(name for name in paired_parameters(kind, coefficients) if name not in held))
     )
 
 
@@ -162,7 +163,9 @@ def _through_stages(bases: StartingCameras, nearest: Estimate, lens: str, loss: 
     """The first coefficients about the image's centre, then more of them."""
     kind, coefficients = parse_centred_lens(lens)
     stages = [tuple(name for name in stage if name in coefficients) for stage in STAGES]
-    stages = [stage for stage in stages if stage] or [coefficients[:1]]
+    shape = [name for name in joint_parameters((), lens).names if name not in CENTRE]
+    stages = [stage for stage in stages if stage] or [tuple(shape[:1])]
+    stages = [stage for stage in stages if stage]  # a lens may have nothing but a centre to be freed
     width, height = nearest.camera.image_size
     K = nearest.camera.intrinsics
     focal = 0.5 * (K.fx + K.fy)
@@ -237,7 +240,7 @@ class _Repetition:
 
     def _onward(self, before: Estimate, here: _Round, way: ndarray) -> tuple[Estimate, _Round]:
         """Where the next round starts, and that round: along the predicted way if that raises no cost."""
-        for share in SHORTER if np.isfinite(way).all() else ():
+        for share in WAY_SHARES if np.isfinite(way).all() else ():
             step = self._theta.values(before.camera) + share * way - self._theta.values(here.estimate.camera)
             ahead = here.estimate._replace(camera=self._theta.moved(here.estimate.camera, step))
             after = self._round(ahead)
@@ -249,7 +252,7 @@ class _Repetition:
     def _round(self, estimate: Estimate) -> _Round | None:
         """Step 1 and step 2 from an estimate; None where it has no cost."""
         assert self._of_pinhole is not None
-        pinhole = solve(self._of_pinhole, estimate, loss=self._loss, options=INNER)
+        pinhole = solve(self._of_pinhole, estimate, loss=self._loss, options=INNER_OPTIONS)
         if pinhole.status is Status.NO_COST:
             return None
         camera, poses = pinhole.unknowns
@@ -261,7 +264,7 @@ class _Repetition:
     def _step_two(self, camera: Camera, poses: Poses) -> Solution[Camera]:
         free = (*self._theta.names, "stretch") if self._stretches else self._theta.names
         return refit_centred_lens(
-            *pairs_of(self._bases, poses), start=camera, free=free, loss=self._loss, options=INNER
+            *pairs_of(self._bases, poses), start=camera, free=free, loss=self._loss, options=INNER_OPTIONS
         )
 
     def _ended(

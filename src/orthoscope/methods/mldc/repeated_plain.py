@@ -31,8 +31,10 @@ from orthoscope.solve.losses import Loss
 
 __all__ = ["PlainRounds", "repeat_plainly"]
 
-SETTLED = 1e-6  # px rms: a round that moves no corrected corner by more has settled
-INNER = Options(max_steps=4, tolerance=1e-14)
+# A round that moves no corrected corner by more, px rms, has settled.
+SETTLED_PX = 1e-6
+# A step within a round starts where the last one ended, and stops where numbers do.
+INNER_OPTIONS = Options(max_steps=4, tolerance=1e-14)
 
 
 class PlainRounds(NamedTuple):
@@ -47,7 +49,7 @@ class PlainRounds(NamedTuple):
     @property
     def status(self) -> str:
         """A sentence."""
-        if self.moved_px < SETTLED:
+        if self.moved_px < SETTLED_PX:
             return Status.CONVERGED.value
         return (
             f"stopped after {self.rounds} plain rounds: a round still moves the corrected corners by"
@@ -94,10 +96,12 @@ def repeat_plainly(
         u[present], v[present] = corrected.T
         straight = replace(camera, lens=Brown(), lens_frame=None)
         problem = Reprojection(replace(observations, u=u, v=v), bases.points, straight, bases.narrowing.free)
-        pinhole = solve(problem, Estimate(straight, poses), options=INNER).unknowns
+        pinhole = solve(problem, Estimate(straight, poses), options=INNER_OPTIONS).unknowns
         poses = pinhole.poses
         start = replace(camera, intrinsics=pinhole.camera.intrinsics)
-        fit = refit_centred_lens(*pairs_of(bases, poses), start=start, free=free, loss=loss, options=INNER)
+        fit = refit_centred_lens(
+            *pairs_of(bases, poses), start=start, free=free, loss=loss, options=INNER_OPTIONS
+        )
         if fit.status is Status.NO_COST:
             raise CalibrationError(
                 f"after {number} plain rounds the lens cannot see all corners. Use --set correct=repeated."
@@ -107,6 +111,6 @@ def repeat_plainly(
         before = corrected
         if progress:
             progress(number, fit.cost)
-        if moved < SETTLED:
+        if moved < SETTLED_PX:
             break
     return PlainRounds(Estimate(camera, poses), number, moved)

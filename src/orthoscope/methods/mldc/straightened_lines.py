@@ -30,7 +30,8 @@ from orthoscope.solve.losses import Loss
 __all__ = ["OwnCamera", "StraightenedLines", "distances"]
 
 
-SHRUNK = 0.1  # of the photograph: a straight image that is smaller is no image of the lines any more
+# A straight image that is smaller than this share of the photograph is no image of the lines any more.
+SHRUNK_SHARE = 0.1
 
 
 class OwnCamera(NamedTuple):
@@ -70,7 +71,8 @@ class StraightenedLines:
         """Whether the lens makes next to nothing of the straight image."""
         straight = unknowns.camera.undistort_pixels(self._detected[self._present])
         return (
-            not np.ptp(straight, axis=0).max() > SHRUNK * np.ptp(self._detected[self._present], axis=0).max()
+            not np.ptp(straight, axis=0).max()
+            > SHRUNK_SHARE * np.ptp(self._detected[self._present], axis=0).max()
         )
 
     def linearise(self, unknowns: OwnCamera, loss: Loss) -> NormalEquations:

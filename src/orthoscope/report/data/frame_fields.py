@@ -17,11 +17,12 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.cells import cells_for
 from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
-from orthoscope.report.data.rounded import RESIDUAL, whole
+from orthoscope.report.data.rounded import RESIDUAL_UNITS, whole
 
 __all__ = ["difference", "displacement", "ideal_image", "lens_misfit_data"]
 
-CELLS = 1200  # of the frame, about
+# The frame has about so many cells.
+CELL_COUNT = 1200
 
 
 def displacement(evaluation: Evaluation) -> dict[str, Any] | str:
@@ -68,11 +69,11 @@ def _field(
     field: Callable[[Float[ndarray, "n 2"]], Float[ndarray, "n 2"]],
     empty: str,
 ) -> dict[str, Any] | str:
-    cells = cells_for(image_size, CELLS)
+    cells = cells_for(image_size, CELL_COUNT)
     vectors = field(cells.centres.reshape(-1, 2))
     return _cells(cells.columns, cells.rows, vectors) if np.isfinite(vectors).any() else empty
 
 
 def _cells(columns: int, rows: int, vectors: Float[ndarray, "n 2"]) -> dict[str, Any]:
-    x, y = (whole(vectors[:, i], RESIDUAL) for i in range(2))
+    x, y = (whole(vectors[:, i], RESIDUAL_UNITS) for i in range(2))
     return {"columns": columns, "rows": rows, "x": x, "y": y}

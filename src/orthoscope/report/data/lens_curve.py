@@ -19,16 +19,19 @@ from orthoscope.report.data.rounded import digits
 
 __all__ = ["along_angles", "angles_shown", "curve", "marks"]
 
-DIRECTIONS = 48  # around the axis
-BEYOND = 1.12  # the curve is drawn this much farther than the frame's farthest corner
-SAMPLES = 120
+# The curve is looked at in so many directions around the axis.
+DIRECTION_COUNT = 48
+# The curve is drawn this much farther than the frame's farthest corner.
+BEYOND_RATIO = 1.12
+# The curve has so many samples.
+CURVE_SAMPLES = 120
 
 
 def curve(evaluation: Evaluation) -> dict[str, Any] | str:
     """Distance from the principal point and radial displacement against the angle from the axis."""
     calibration = evaluation.calibration
     camera = calibration.camera
-    angles = angles_shown(camera, SAMPLES)
+    angles = angles_shown(camera, CURVE_SAMPLES)
     if not len(angles):
         return "No pixel of the frame has a ray."
     radius, moved = along_angles(camera, angles)
@@ -52,7 +55,7 @@ def angles_shown(camera: Camera, count: int) -> Float[ndarray, " a"]:
     edge = _largest_angle(camera.unproject(_outline(camera)))
     if not np.isfinite(edge):
         return np.empty(0)
-    return np.linspace(0.0, min(BEYOND * edge, camera.lens.chart.reach - 1e-3), count)
+    return np.linspace(0.0, min(BEYOND_RATIO * edge, camera.lens.chart.reach - 1e-3), count)
 
 
 def along_angles(
@@ -61,7 +64,7 @@ def along_angles(
     """For each angle and direction: distance of the image from the principal point, and how much of it the
     lens added.
     """
-    phi = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    phi = 2 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
     across, along = np.sin(angles[:, None]), np.cos(angles[:, None])
     rays = np.stack(np.broadcast_arrays(across * np.cos(phi), across * np.sin(phi), along), axis=-1)
     centre = np.array([camera.intrinsics.cx, camera.intrinsics.cy])

@@ -9,9 +9,12 @@ import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
 
-__all__ = ["PLACE", "RESIDUAL", "digits", "whole"]
+__all__ = ["PLACE_UNITS", "RESIDUAL_UNITS", "digits", "whole"]
 
-PLACE, RESIDUAL = 10, 1000  # units in a pixel
+# A place is told in so many units a pixel.
+PLACE_UNITS = 10
+# A residual is told in so many units a pixel.
+RESIDUAL_UNITS = 1000
 
 
 def whole(values: ndarray, units: int) -> list:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from orthoscope.evaluation.evaluate import Evaluation
-from orthoscope.report.data.rounded import PLACE, RESIDUAL, whole
+from orthoscope.report.data.rounded import PLACE_UNITS, RESIDUAL_UNITS, whole
 
 __all__ = ["trust", "without_each"]
 
@@ -23,11 +23,11 @@ def trust(evaluation: Evaluation) -> dict[str, Any] | str:
     return {
         "rows": rows,
         "columns": columns,
-        "far": whole(error.far.ravel(), RESIDUAL),
-        "near": whole(error.near.ravel(), RESIDUAL),
+        "far": whole(error.far.ravel(), RESIDUAL_UNITS),
+        "near": whole(error.near.ravel(), RESIDUAL_UNITS),
         "limit": float(f"{error.limit_px:.3g}"),
         "distance": float(f"{error.distance:.3g}"),
-        "region": whole(error.region.ravel(), PLACE),
+        "region": whole(error.region.ravel(), PLACE_UNITS),
     }
 
 

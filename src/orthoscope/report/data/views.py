@@ -8,7 +8,7 @@ import numpy as np
 
 from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.geometry.arrays import ndarray
-from orthoscope.report.data.rounded import PLACE, RESIDUAL, digits, whole
+from orthoscope.report.data.rounded import PLACE_UNITS, RESIDUAL_UNITS, digits, whole
 
 __all__ = ["suspects_of", "views"]
 
@@ -33,11 +33,11 @@ def views(evaluation: Evaluation) -> list[dict[str, Any]]:
             "heldOut": _number(error.held_out_rms_px) if error else None,
             "suspect": suspects.get(view.image, ""),
             "pose": [*digits(pose.rotation.ravel(), 6), *digits(pose.translation, 6)],
-            **_columns(view.pixels, "x", "y", PLACE),
-            **_columns(residuals, "ex", "ey", RESIDUAL),
+            **_columns(view.pixels, "x", "y", PLACE_UNITS),
+            **_columns(residuals, "ex", "ey", RESIDUAL_UNITS),
         }
         if np.isfinite(unseen).any():
-            one |= _columns(unseen, "hx", "hy", RESIDUAL)
+            one |= _columns(unseen, "hx", "hy", RESIDUAL_UNITS)
         if not np.array_equal(view.ids, every):
             one["ids"] = view.ids.tolist()
         told.append(one)

@@ -19,7 +19,8 @@ __all__ = ["draw_key", "frame_key", "round_below", "round_magnification", "true_
 def round_magnification(size: ndarray, diagonal: float, *, share: float) -> float:
     """A round number that draws a long arrow (the ninth in ten) at about `share` of the diagonal.
 
-    size: of the arrows, in the diagonal's unit.
+    Args:
+        size: of the arrows, in the diagonal's unit.
     """
     typical = float(np.quantile(size, 0.9))
     return round_below(share * diagonal / typical) if typical > 1e-12 else 1.0

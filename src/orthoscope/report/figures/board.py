@@ -17,13 +17,15 @@ from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.report.figures.arrows import draw_key, round_magnification, true_to_scale
-from orthoscope.report.figures.style import GREY, INK, WIDTH, note, styled
+from orthoscope.report.figures.style import COLUMN_WIDTH, GREY, INK, note, styled
 from orthoscope.report.shape import corners_seen
 
 __all__ = ["target_misfit", "target_shape"]
 
-MARGIN = 0.09  # around the corners, as a share of the board's diagonal
-LONG = 0.07  # of the diagonal: a long arrow
+# Around the corners this share of the board's diagonal is left.
+MARGIN_SHARE = 0.09
+# A long arrow has this share of the diagonal.
+LONG_ARROW_SHARE = 0.07
 
 
 @styled
@@ -72,7 +74,7 @@ def _displaced(
     figure.colorbar(
         dots, ax=axes, label="out of the plane, away from the camera (mm)", pad=0.02, shrink=0.9, aspect=32
     )
-    magnification = round_magnification(np.hypot(*moved[:, :2].T), diagonal, share=LONG)
+    magnification = round_magnification(np.hypot(*moved[:, :2].T), diagonal, share=LONG_ARROW_SHARE)
     axes.quiver(
         *places[:, :2].T, *moved[:, :2].T, color=INK, width=0.0026, zorder=3, **true_to_scale(magnification)
     )
@@ -105,9 +107,9 @@ def _board(points: Float[ndarray, "m 3"]) -> tuple[Figure, Axes, float]:
     plane = 1e3 * points[:, :2]
     low, high = plane.min(0), plane.max(0)
     diagonal = max(float(np.hypot(*(high - low))), 1e-9)
-    low, high = low - MARGIN * diagonal, high + MARGIN * diagonal
-    tall = min(max((WIDTH - 1.1) * (high - low)[1] / (high - low)[0], 2.2), 5.2)
-    figure = Figure(figsize=(WIDTH, tall + 0.75))
+    low, high = low - MARGIN_SHARE * diagonal, high + MARGIN_SHARE * diagonal
+    tall = min(max((COLUMN_WIDTH - 1.1) * (high - low)[1] / (high - low)[0], 2.2), 5.2)
+    figure = Figure(figsize=(COLUMN_WIDTH, tall + 0.75))
     axes = figure.add_subplot()
     axes.set(
         xlim=(low[0], high[0]),

@@ -1,7 +1,7 @@
 """Methods and lenses side by side: the error of each, and what each loses against the best.
 
-Both axes are logarithmic where errors differ by more than WIDE; that of the losses is then linear up to where
-losses matter.
+Both axes are logarithmic where errors differ by more than WIDE_RATIO; that of the losses is then linear up to
+where losses matter.
 """
 
 from __future__ import annotations
@@ -16,10 +16,18 @@ from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, named, note
 
 __all__ = ["comparison_errors"]
 
-WIDTH, EACH, AROUND = 11.9, 0.36, 1.1  # inches: the page's two columns; for each entry; for titles and axes
-WIDE = 4.0
-SURE = 2.0  # standard errors, as far as bars reach: what they leave out is hardly chance
-LINEAR = 0.2  # of the best's error: losses below this are drawn to scale
+# The figure is as wide as the page's two columns, inches.
+FIGURE_WIDTH = 11.9
+# Each entry takes so many inches.
+ENTRY_HEIGHT = 0.36
+# Titles and axes take so many inches.
+HEIGHT_AROUND = 1.1
+# Axes are logarithmic where errors differ by more than this factor.
+WIDE_RATIO = 4.0
+# Bars reach as far as so many standard errors: what they leave out is hardly chance.
+BAR_ERRORS = 2.0
+# Losses below this share of the best's error are drawn to scale.
+LINEAR_SHARE = 0.2
 
 
 @styled
@@ -28,7 +36,7 @@ def comparison_errors(comparison: Comparison) -> Figure:
     the best, paired by view.
     """
     standings = comparison.standings
-    figure = Figure(figsize=(WIDTH, AROUND + EACH * max(len(standings), 3)))
+    figure = Figure(figsize=(FIGURE_WIDTH, HEIGHT_AROUND + ENTRY_HEIGHT * max(len(standings), 3)))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     _errors(left, comparison)
     _losses(right, comparison)
@@ -53,7 +61,7 @@ def _errors(axes: Axes, comparison: Comparison) -> None:
     held_out, used = (
         np.array([getattr(standing, of) for standing in standings]) for of in ("held_out_px", "rms_px")
     )
-    bars = SURE * np.nan_to_num([standing.error_px for standing in standings])
+    bars = BAR_ERRORS * np.nan_to_num([standing.error_px for standing in standings])
     axes.scatter(used, rows, s=26, color=BLUE, label="on photographs that were used", zorder=5)
     marks = {"fmt": "o", "color": ORANGE, "ms": 5.5, "lw": 1.4, "label": "held out, ± 2 standard errors"}
     axes.errorbar(held_out, rows, xerr=np.minimum(bars, 0.9 * held_out), **marks, zorder=4)
@@ -62,7 +70,7 @@ def _errors(axes: Axes, comparison: Comparison) -> None:
 
 
 def _scale(axes: Axes, least: float, most: float) -> None:
-    if least > 0 and most > WIDE * least:
+    if least > 0 and most > WIDE_RATIO * least:
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -77,10 +85,10 @@ def _losses(axes: Axes, comparison: Comparison) -> None:
         return
     rows, standings = zip(*judged, strict=True)
     losses = np.array([standing.loses_px for standing in standings])
-    bars = SURE * np.nan_to_num([standing.loses_error_px for standing in standings])
+    bars = BAR_ERRORS * np.nan_to_num([standing.loses_error_px for standing in standings])
     best = standings[0].held_out_px
-    if best > 0 and losses.max() > WIDE * LINEAR * best:
-        axes.set_xscale("symlog", linthresh=LINEAR * best, linscale=1.0)
+    if best > 0 and losses.max() > WIDE_RATIO * LINEAR_SHARE * best:
+        axes.set_xscale("symlog", linthresh=LINEAR_SHARE * best, linscale=1.0)
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.axvline(0.0, color=GREY, lw=0.9, zorder=1)
     axes.errorbar(losses, rows, xerr=bars, fmt="o", color=INK, ms=4.5, lw=1.2, zorder=3)

@@ -15,12 +15,12 @@ from orthoscope.evaluation.coverage import COVERAGE_GRID, cells_with_rays
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Bool, ndarray
 from orthoscope.geometry.cells import Cells
-from orthoscope.report.figures.style import BLUE, DENSE, EMPTY, RED, frame_figure, styled
+from orthoscope.report.figures.style import BLUE, DENSE_MARKS, EMPTY_COLOUR, RED, frame_figure, styled
 
 __all__ = ["coverage"]
 
 MISSING = {"facecolor": "#FBE9DF", "edgecolor": RED, "alpha": 0.8, "hatch": "////", "linewidth": 0.0}
-NO_RAY = {"facecolor": EMPTY, "linewidth": 0.0}
+NO_RAY = {"facecolor": EMPTY_COLOUR, "linewidth": 0.0}
 
 
 @styled
@@ -42,7 +42,7 @@ def coverage(calibration: Calibration) -> Figure:
     axes.set_yticks(cells.y_edges, minor=True)
     axes.grid(which="minor")
     axes.tick_params(which="minor", length=0)
-    many = len(pixels) > DENSE
+    many = len(pixels) > DENSE_MARKS
     axes.scatter(
         *pixels.T, s=3 if many else 7, color=BLUE, alpha=0.35 if many else 0.6, linewidth=0, rasterized=many
     )

@@ -19,13 +19,25 @@ from orthoscope.models.charts import GNOMONIC
 from orthoscope.models.difference import image_difference
 from orthoscope.report.data.frame_fields import ideal_image
 from orthoscope.report.data.lens_curve import along_angles, angles_shown, marks
-from orthoscope.report.figures.style import BLUE, GREY, INK, ORANGE, RED, WIDTH, frame_figure, note, styled
+from orthoscope.report.figures.style import (
+    BLUE,
+    COLUMN_WIDTH,
+    GREY,
+    INK,
+    ORANGE,
+    RED,
+    frame_figure,
+    note,
+    styled,
+)
 from orthoscope.report.figures.vector_map import vector_map
 
 __all__ = ["displacement_map", "distortion_curve", "lens_difference"]
 
-SAMPLES = 240  # along the curve
-COLOURS = {"seen": ORANGE, "edge": INK, "end": RED}  # of what is marked on it
+# The curve has so many samples.
+CURVE_SAMPLES = 240
+# What is marked on the curve has these colours.
+MARK_COLOURS = {"seen": ORANGE, "edge": INK, "end": RED}
 
 
 @styled
@@ -37,11 +49,11 @@ def distortion_curve(calibration: Calibration) -> Figure:
     pixel, the lens's end.
     """
     camera = calibration.camera
-    figure = Figure(figsize=(WIDTH, 4.9))
+    figure = Figure(figsize=(COLUMN_WIDTH, 4.9))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.25, 1.0))
     above.set_ylabel("distance from principal point (px)")
     below.set(xlabel="angle from the optical axis (°)", ylabel="radial displacement (px)")
-    angles = angles_shown(camera, SAMPLES)
+    angles = angles_shown(camera, CURVE_SAMPLES)
     if not len(angles):
         note(above, "no pixel of the frame's border or inside has a ray")
         return figure
@@ -145,7 +157,10 @@ def _marks(axes: Axes, calibration: Calibration, last: float) -> None:
     for kind, angle, words in marks(calibration):
         if np.isfinite(angle) and angle <= last:
             axes.axvline(
-                np.rad2deg(angle), color=COLOURS[kind], lw=1.1, label=f"{words}, {np.rad2deg(angle):.1f}°"
+                np.rad2deg(angle),
+                color=MARK_COLOURS[kind],
+                lw=1.1,
+                label=f"{words}, {np.rad2deg(angle):.1f}°",
             )
         if kind == "seen" and np.isfinite(angle):
             axes.axvspan(np.rad2deg(angle), np.rad2deg(last), color=ORANGE, alpha=0.09, linewidth=0)

@@ -17,8 +17,8 @@ from orthoscope.geometry.cells import cells_for
 from orthoscope.report.figures.arrows import frame_key, round_magnification, true_to_scale
 from orthoscope.report.figures.style import (
     BLUE,
-    DENSE,
-    EMPTY,
+    DENSE_MARKS,
+    EMPTY_COLOUR,
     INK,
     ORANGE,
     RED,
@@ -30,8 +30,10 @@ from orthoscope.report.figures.style import (
 
 __all__ = ["lens_misfit", "residual_vectors", "residuals_by_place", "residuals_by_view"]
 
-NAMED = 60  # photographs; with more of them the axis carries their numbers
-FEWEST = 4  # corners in a cell below which its mean says nothing
+# With more photographs the axis carries their numbers instead of names.
+NAMED_PHOTOGRAPHS = 60
+# The mean of a cell with fewer corners says nothing.
+FEWEST_CORNERS = 4
 
 
 @styled
@@ -45,7 +47,7 @@ def residual_vectors(calibration: Calibration) -> Figure:
     size = np.hypot(*residuals.T)
     order = np.argsort(size, kind="stable")  # the longest on top
     top = max(float(np.quantile(size, 0.98)), 1e-12)
-    many = len(pixels) > DENSE
+    many = len(pixels) > DENSE_MARKS
     magnification = round_magnification(size, _diagonal(calibration), share=0.02 if many else 0.03)
     arrows = axes.quiver(
         *pixels[order].T,
@@ -71,12 +73,12 @@ def residuals_by_place(evaluation: Evaluation) -> Figure:
     figure, axes = frame_figure(calibration.camera.image_size)
     kind, pixels, residuals = _fairest(evaluation)
     cells = cells_for(calibration.camera.image_size, int(np.clip(len(pixels) / 8, 24, 300)))
-    told = cells.count(pixels) >= FEWEST
+    told = cells.count(pixels) >= FEWEST_CORNERS
     if not told.any():
-        note(axes, f"no place has {FEWEST} corners")
+        note(axes, f"no place has {FEWEST_CORNERS} corners")
         return figure
     spread = np.where(told, np.sqrt(cells.mean(pixels, (residuals**2).sum(-1))), np.nan)
-    axes.set_facecolor(EMPTY)
+    axes.set_facecolor(EMPTY_COLOUR)
     shown = axes.pcolormesh(
         cells.x_edges,
         cells.y_edges,
@@ -99,7 +101,7 @@ def lens_misfit(evaluation: Evaluation) -> Figure:
     """
     misfit, image_size = evaluation.misfit.lens, evaluation.calibration.camera.image_size
     figure, axes = frame_figure(image_size)
-    axes.set_facecolor(EMPTY)
+    axes.set_facecolor(EMPTY_COLOUR)
     size = np.hypot(misfit.residuals[..., 0], misfit.residuals[..., 1])
     if np.isnan(misfit.test.f):
         note(axes, "too few views to tell")
@@ -169,7 +171,7 @@ def _name_views(axes: Axes, names: list[str], odd: ndarray, tops: ndarray) -> No
     """Names below the bars, or numbers where there are many and names above the suspects' bars (`tops`, px)
     only.
     """
-    if len(names) <= NAMED:
+    if len(names) <= NAMED_PHOTOGRAPHS:
         axes.set_xticks(
             np.arange(len(names)), [_shortened(name) for name in names], rotation=90 if len(names) > 8 else 0
         )

@@ -15,12 +15,13 @@ from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
-from orthoscope.report.data.boards import board_corners, frustum
-from orthoscope.report.figures.style import BLUE, INK, ORANGE, RED, WIDTH, styled
+from orthoscope.report.data.boards import board_corners, boards_in, frustum
+from orthoscope.report.figures.style import BLUE, COLUMN_WIDTH, INK, ORANGE, RED, styled
 
 __all__ = ["board_poses"]
 
-NUMBERED = 30  # boards; with more of them numbers would only hide each other
+# With more boards numbers would only hide each other.
+NUMBERED_BOARDS = 30
 
 
 @styled
@@ -29,7 +30,7 @@ def board_poses(evaluation: Evaluation) -> Figure:
     stand out.
     """
     calibration = evaluation.calibration
-    figure = Figure(figsize=(WIDTH, 4.7))
+    figure = Figure(figsize=(COLUMN_WIDTH, 4.7))
     figure.set_layout_engine("none")  # matplotlib's layouts do not know how far 3-D labels reach
     axes = figure.add_axes((0.02, 0.07, 0.9, 0.91), projection="3d", computed_zorder=False)
     assert isinstance(axes, Axes3D)
@@ -52,7 +53,7 @@ def board_poses(evaluation: Evaluation) -> Figure:
         axes.plot(*boards[:, 0].T, "o", ms=2.6, color=ORANGE, label="corner 0")
         axes.legend(loc="upper left", borderaxespad=0.0)
     for i, board in enumerate(boards):
-        if odd[i] or len(boards) <= NUMBERED:
+        if odd[i] or len(boards) <= NUMBERED_BOARDS:
             x, y, z = board.mean(0)
             axes.text(x, y, z, str(i + 1), color=RED if odd[i] else INK, fontsize=7, ha="center", va="center")
     _frame_scene(axes, np.concatenate([boards.reshape(-1, 3), pyramid.reshape(-1, 3)]))
@@ -77,8 +78,9 @@ def _frame_scene(axes: Axes3D, points: Float[ndarray, "n 3"]) -> None:
 
 def _boards(calibration: Calibration) -> Float[ndarray, "views 4 3"]:
     """The corners of each board's outline, camera frame, metres, beginning with that of corner 0."""
-    outline = board_corners(calibration.detections.target)
-    return np.array([pose.apply(outline) for pose in calibration.camera_from_target]).reshape(-1, 4, 3)
+    outlines = board_corners(calibration.detections.target)[boards_in(calibration.detections)]
+    seen = zip(calibration.camera_from_target, outlines, strict=True)
+    return np.array([pose.apply(outline) for pose, outline in seen]).reshape(-1, 4, 3)
 
 
 def _frustum(camera: Camera, boards: Float[ndarray, "views 4 3"]) -> Float[ndarray, "8 2 3"]:

@@ -22,7 +22,7 @@ from orthoscope.files.printable import printable
 
 __all__ = [
     "BLUE",
-    "DENSE",
+    "DENSE_MARKS",
     "GREY",
     "INK",
     "ORANGE",
@@ -37,11 +37,15 @@ __all__ = [
 ]
 
 BLUE, SKY, ORANGE, RED, GREY, INK = "#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#8A9199", "#20262D"
-EMPTY = "#F1F2F4"  # places without data
+# Places without data have this colour.
+EMPTY_COLOUR = "#F1F2F4"
 
-DENSE = 1500  # marks; more of them are drawn as an image inside the SVG, which keeps the page small
-DPI = 180  # of such images
-WIDTH = 5.8  # inches; a column of the page
+# More marks than this are drawn as an image inside the SVG, which keeps the page small.
+DENSE_MARKS = 1500
+# Marks that are drawn as an image have so many dots an inch.
+IMAGE_DPI = 180
+# A column of the page is so many inches wide.
+COLUMN_WIDTH = 5.8
 
 STYLE = {
     "figure.constrained_layout.use": True,
@@ -96,8 +100,8 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 def frame_figure(image_size: tuple[int, int]) -> tuple[Figure, Axes]:
     """A figure of column width whose axes are the photograph's frame, pixels, y down."""
     width, height = image_size
-    tall = min(max((WIDTH - 1.1) * height / width, 2.2), 5.2)
-    figure = Figure(figsize=(WIDTH, tall + 0.75))
+    tall = min(max((COLUMN_WIDTH - 1.1) * height / width, 2.2), 5.2)
+    figure = Figure(figsize=(COLUMN_WIDTH, tall + 0.75))
     axes = figure.add_subplot()
     frame_axes(axes, image_size)
     return figure, axes
@@ -132,7 +136,7 @@ def to_svg(figure: Figure, name: str) -> str:
     buffer = io.StringIO()
     with style.context(["default", STYLE]):
         figure.savefig(
-            buffer, format="svg", dpi=DPI, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type"))
+            buffer, format="svg", dpi=IMAGE_DPI, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type"))
         )
     svg = buffer.getvalue()
     svg = svg[svg.index("<svg") :].replace("'DejaVu Sans'", "var(--sans)")

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.report.figures.style import EMPTY, note
+from orthoscope.report.figures.style import EMPTY_COLOUR, note
 
 __all__ = ["vector_map"]
 
@@ -25,7 +25,7 @@ def vector_map(
     """Draw a field over the frame. label: of the colours, with the unit. empty: what to say where the field
     has no value anywhere.
     """
-    axes.set_facecolor(EMPTY)
+    axes.set_facecolor(EMPTY_COLOUR)
     x, y, vectors = _sampled(image_size, field, 240)
     size = np.hypot(vectors[..., 0], vectors[..., 1])
     if not np.isfinite(size).any():

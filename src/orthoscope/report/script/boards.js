@@ -1,9 +1,9 @@
 /* Boards in space, where each was. */
 function poses() {
   const d = panels.poses,
-    o = d.outline;
-  const placed = views.map(v =>
-    o.map(q =>
+    board = d.boards || views.map(() => 0); // which of several boards a view shows
+  const placed = views.map((v, i) =>
+    d.outlines[board[i]].map(q =>
       [0, 1, 2].map(
         r => v.pose[3 * r] * q[0] + v.pose[3 * r + 1] * q[1] + v.pose[3 * r + 2] * q[2] + v.pose[9 + r],
       ),

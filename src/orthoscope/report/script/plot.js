@@ -148,7 +148,6 @@ class Plot {
     if (this.canvas.width !== Math.round(width * dpr) || this.canvas.height !== Math.round(height * dpr)) {
       this.canvas.width = Math.round(width * dpr);
       this.canvas.height = Math.round(height * dpr);
-      this.canvas.style.height = `${height}px`;
     }
     this.ctx.setTransform(dpr, 0, 0, dpr, 0, 0);
     this.width = width;

@@ -1,0 +1,46 @@
+"""`--target` more than once: several boards in the same photographs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orthoscope.files.images import write_image
+from orthoscope.formats.own.json import load
+from orthoscope.geometry.pose import Pose, rotation_from_vector
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lenses import Brown
+from orthoscope.simulation.render import Renderer
+from orthoscope.targets.table import parse_target
+
+CAMERA = Camera((640, 480), Intrinsics(600.0, 600.0, 320.0, 240.0), Brown())
+SPECS = "chessboard:6x5:25mm", "charuco:6x6:25mm:18mm:DICT_5X5_100"
+
+
+def test_each_target_that_is_named_has_a_view_of_each_photograph_and_a_part_in_the_camera(run, tmp_path):
+    boards, renderer = [parse_target(spec) for spec in SPECS], Renderer(CAMERA)
+    for number in range(4):
+        stands = []
+        for board, x in zip(boards, (-0.18, 0.02), strict=True):
+            rotation = rotation_from_vector(np.array([0.3 - 0.2 * number, 0.2 * number - 0.4, 0.0]))
+            stands.append((board, Pose(rotation, np.array([x, -0.06, 0.5]))))
+        picture = renderer.photograph_of(stands, rng=np.random.default_rng(number))
+        write_image(tmp_path / f"{number}.png", picture)
+    targets = [word for spec in SPECS for word in ("--target", spec)]
+    done = run(
+        "calibrate",
+        tmp_path,
+        *targets,
+        "-o",
+        tmp_path / "camera",
+        "--method",
+        "fccm",
+        "--lens",
+        "brown:k1",
+        "--undistort",
+    )
+    assert done.code == 0, done.err
+    calibration = load(tmp_path / "camera" / "calibration.json")
+    names = [view.image for view in calibration.detections.views]
+    assert names == [f"{number}.png:board{board}" for number in range(4) for board in (1, 2)]
+    assert abs(calibration.camera.intrinsics.fx - 600.0) < 2.0
+    assert "0.png:board2" in (tmp_path / "camera" / "report.html").read_text()
