@@ -215,6 +215,6 @@ def _write_straight(
     written, _ = straighten(
         paths, calibration.camera, out / "undistorted", view=view, jobs=jobs, cluster=cluster
     )
-    beside = write_beside(calibration.camera, view, out / "undistorted", maps=False)
+    beside = write_beside(calibration.camera, view, out / "undistorted", maps=None)
     replace_outputs(out / "undistorted", [*written, *beside], paths)
     return out / "undistorted"
