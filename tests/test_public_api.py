@@ -88,7 +88,7 @@ def test_matrix_and_distortion_are_a_line_each(calibration):
         camera_with(LENSES["fov"]()).opencv()
 
 
-@pytest.mark.parametrize("method", ["decoupled", "fccm", "mldc", "nmldc"])
+@pytest.mark.parametrize("method", ["decoupled", "fccm", "mldc", "nmldc", "hartley_kang", "fitzgibbon"])
 def test_editors_know_the_settings_that_a_method_has(method):
-    told = getattr(settings, f"{method.capitalize()}Settings")
+    told = getattr(settings, "".join(map(str.capitalize, method.split("_"))) + "Settings")
     assert list(told.__annotations__) == settings_of(method)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from click.testing import CliRunner
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from orthoscope.cli.method_settings import settings_from
 from orthoscope.cli.simulate import simulate
@@ -42,3 +42,20 @@ def test_the_papers_corners_are_those_of_its_first_trial(tmp_path):
         assert_array_equal(read.views[0].pixels, part.views[0].pixels)
         assert len(read.views) == len(part.views)
     assert (tmp_path / "truth.json").exists()
+
+
+def test_corrected_points_are_written_as_pairs_and_as_detections(run, calibrated, tmp_path):
+    told = run(
+        *("calibrate", calibrated / "detections.json", "--method", "mldc", "--set", "correct=nearest"),
+        *("--corrected", "--no-report", "-o", tmp_path),
+    )
+    assert told.code == 0, told.err
+    straight, bent = (
+        load_detections(tmp_path / "corrected.json"),
+        load_detections(tmp_path / "detections.json"),
+    )
+    rows = (tmp_path / "corrected.csv").read_text().splitlines()
+    assert rows[0] == "image,corner,detected_x,detected_y,corrected_x,corrected_y"
+    assert len(rows) == 1 + bent.corners
+    first = [float(part) for part in rows[1].split(",")[2:]]
+    assert_allclose(first, [*bent.views[0].pixels[0], *straight.views[0].pixels[0]], atol=1e-4)

@@ -77,3 +77,12 @@ def test_residuals_of_views_are_in_their_order_and_of_their_corners():
     sizes = [len(e) for e in found.residuals()]
     assert sizes == [len(view.ids) for view in DETECTIONS.views]
     assert_allclose(found.rms_px**2 * sum(sizes), sum((e**2).sum() for e in found.residuals()))
+
+
+def test_corrected_points_are_a_straight_photograph_of_the_target():
+    """A calibration of them finds the same pin-hole and no lens."""
+    made = fccm(DETECTIONS, lens="brown")
+    again = fccm(made.corrected(), lens="brown")
+    assert_allclose(again.camera.intrinsics.as_tuple(), made.camera.intrinsics.as_tuple(), atol=1e-5)
+    assert_allclose(again.camera.lens.coefficients, 0.0, atol=1e-6)
+    assert again.rms_px < 1e-6

@@ -81,9 +81,14 @@ def test_every_figure_and_table_has_its_file(made):
         "lenses_low",
         "lenses_high",
     }
-    assert set(made.texts) == {"paper.html", "trials.csv", "methods.csv", "eq7.csv", "table1.csv"} | {
-        f"{name}.csv" for name in figures
-    }
+    assert set(made.texts) == {
+        "paper.html",
+        "trials.csv",
+        "trials_photographs.csv",
+        "methods.csv",
+        "eq7.csv",
+        "table1.csv",
+    } | {f"{name}.csv" for name in figures}
 
 
 def test_files_have_their_columns_and_a_row_for_each_method_and_level(made):
@@ -101,8 +106,8 @@ def test_files_have_their_columns_and_a_row_for_each_method_and_level(made):
         "images",
         "exact",
         "lenses",
-        "photographs",
     }
+    assert {row["study"] for row in rows_of(made.texts["trials_photographs.csv"])} == {"photographs"}
 
 
 def test_figures_are_the_means_of_the_trials(made):

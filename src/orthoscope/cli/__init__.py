@@ -25,6 +25,7 @@ from orthoscope.cli.given_files import keeping_inputs
 from orthoscope.cli.paper import paper
 from orthoscope.cli.report import report
 from orthoscope.cli.simulate import simulate
+from orthoscope.cli.straighten import straighten
 from orthoscope.cli.target import target
 from orthoscope.cli.telling import tell
 from orthoscope.cli.undistort import undistort
@@ -54,6 +55,7 @@ for verb in (
     evaluate,
     compare,
     undistort,
+    straighten,
     export,
     convert,
     tools,
@@ -109,6 +111,10 @@ def main() -> None:
         _leave(error)
 
 
+# Messages list photographs with reasons, each on a line of its own after this; any other line end is escaped.
+LISTED = "\n  "
+
+
 def _leave(error: Exception) -> None:
     """Exit with the message and code of an error of ours; any other is a defect and keeps its traceback."""
     from concurrent.futures import BrokenExecutor
@@ -128,7 +134,8 @@ def _leave(error: Exception) -> None:
         sys.exit(1)
     if not isinstance(error, InputError | CalibrationError):
         raise error
-    tell(f"orthoscope: {error}", err=True)
+    first, *listed = str(error).split(LISTED)
+    tell(f"orthoscope: {first}", *(f"  {line}" for line in listed), err=True)
     sys.exit(2 if isinstance(error, InputError) else 1)
 
 

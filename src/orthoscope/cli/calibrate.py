@@ -74,6 +74,14 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 )
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
 @options.keep
+@click.option(
+    "--corrected",
+    is_flag=True,
+    help=(
+        "Also write the corrected points, where the pin-hole alone sees the corners: beside the detected ones in"
+        " OUT/corrected.csv, as detections in OUT/corrected.json."
+    ),
+)
 @click.option("--report/--no-report", default=True, help="Whether to write OUT/report.html.")
 @options.verbose
 @options.as_json
@@ -103,6 +111,7 @@ def calibrate_into(
     export: str | None = None,
     undistort: bool = False,
     keep: str = "all",
+    corrected: bool = False,
     report: bool = True,
     verbose: bool = False,
     as_json: bool = False,
@@ -151,6 +160,8 @@ def calibrate_into(
     for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION_NAME)):
         save(thing, out / name)
         written.append(out / name)
+    if corrected:
+        written += _write_corrected(calibration, out)
     if export:
         written += _write_for(export, calibration, out)
     if report:
@@ -162,6 +173,17 @@ def calibrate_into(
     else:
         tell(*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written)))
     return evaluation
+
+
+def _write_corrected(calibration: Any, out: Path) -> list[Path]:
+    """Write the corrected points, as a table and as detections."""
+    from orthoscope.files.whole_files import write_text
+    from orthoscope.formats.corrected import corrected_csv
+    from orthoscope.formats.own.json import save
+
+    write_text(out / "corrected.csv", corrected_csv(calibration))
+    save(calibration.corrected(), out / "corrected.json")
+    return [out / "corrected.csv", out / "corrected.json"]
 
 
 def _lenses_of(tool: str | None) -> tuple[str, ...]:

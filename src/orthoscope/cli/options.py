@@ -174,7 +174,7 @@ method: Decorator = click.option(
     metavar="NAME",
     help=(
         "How to calibrate: decoupled (target's shape and a free lens first), fccm (jointly, the target flat),"
-        " nmldc (straight lines first) or mldc (the paper's)."
+        " nmldc (straight lines first), mldc (the paper's), hartley_kang or fitzgibbon (linearly, lens first)."
     ),
 )
 shape: Decorator = click.option(

@@ -158,7 +158,7 @@ def _write_papers(distortion: str, noise: float, seed: int, out: Path) -> None:
     for thing, name in (
         (training, "training"),
         (test, "test"),
-        (papers_scene(distortion, seed=seed, trial=0), "truth"),
+        (papers_scene(distortion, Condition(noise), seed=seed, trial=0), "truth"),
     ):
         save(thing, out / f"{name}.json")
     tell(

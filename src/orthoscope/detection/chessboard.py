@@ -99,7 +99,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         best = _by_opencv(grey, board) or best
     if best:
         return best
-    return Unseen("only a part of it was seen, which may be several" if open_ else "was not found in it")
+    return Unseen("is in it in part only, and which part cannot be told" if open_ else "was not found in it")
 
 
 def _in_photograph(

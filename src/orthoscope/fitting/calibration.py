@@ -7,7 +7,7 @@ own.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -179,6 +179,21 @@ class Calibration:
         domain has ended.
         """
         return residuals_of(self.camera, self.camera_from_target, self.detections, shape=self.target_shape)
+
+    def corrected(self) -> Detections:
+        """The detections with every corner where the pin-hole alone sees it (the paper's q_p).
+
+        Detections of a straight photograph are detections like any: a calibration of these finds K and no
+        lens. Corners beside or behind the camera have no such place and are left out.
+        """
+        K, points = self.camera.intrinsics, self.target_points
+        views = []
+        for pose, view in zip(self.camera_from_target, self.detections.views, strict=True):
+            x, y, z = pose.apply(points[view.ids]).T
+            front = z > 0
+            pixels = np.stack(K.pixel(x[front] / z[front], y[front] / z[front]), axis=-1)
+            views.append(replace(view, ids=view.ids[front], pixels=pixels))
+        return replace(self.detections, views=tuple(views))
 
     @property
     def target_points(self) -> Float[ndarray, "m 3"]:

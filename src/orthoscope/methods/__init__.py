@@ -17,7 +17,14 @@ from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.blas import with_one_thread
-from orthoscope.methods.settings import DecoupledSettings, FccmSettings, MldcSettings, NmldcSettings
+from orthoscope.methods.settings import (
+    DecoupledSettings,
+    FccmSettings,
+    FitzgibbonSettings,
+    HartleyKangSettings,
+    MldcSettings,
+    NmldcSettings,
+)
 from orthoscope.targets.detections import Detections
 
 __all__ = ["METHODS", "calibrate", "check_settings", "settings_of"]
@@ -45,6 +52,8 @@ METHODS = _Methods(
         "fccm": f"{__name__}.fccm",
         "mldc": f"{__name__}.mldc.mldc",
         "nmldc": f"{__name__}.mldc.nmldc",
+        "hartley_kang": f"{__name__}.radial_curve.hartley_kang",
+        "fitzgibbon": f"{__name__}.radial_curve.fitzgibbon",
     }
 )
 
@@ -78,6 +87,14 @@ def calibrate(
 @overload
 def calibrate(
     detections: Detections, *, method: Literal["mldc"], **settings: Unpack[MldcSettings]
+) -> Calibration: ...
+@overload
+def calibrate(
+    detections: Detections, *, method: Literal["hartley_kang"], **settings: Unpack[HartleyKangSettings]
+) -> Calibration: ...
+@overload
+def calibrate(
+    detections: Detections, *, method: Literal["fitzgibbon"], **settings: Unpack[FitzgibbonSettings]
 ) -> Calibration: ...
 @overload
 def calibrate(detections: Detections, *, method: str, **settings: Any) -> Calibration: ...

@@ -8,7 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypedDict
 
-__all__ = ["DecoupledSettings", "FccmSettings", "MldcSettings", "NmldcSettings"]
+__all__ = [
+    "DecoupledSettings",
+    "FccmSettings",
+    "FitzgibbonSettings",
+    "HartleyKangSettings",
+    "MldcSettings",
+    "NmldcSettings",
+]
 
 
 class DecoupledSettings(TypedDict, total=False):
@@ -62,3 +69,17 @@ class MldcSettings(TypedDict, total=False):
     rounds: int
     max_steps: int
     progress: Callable[[int, float], None] | None
+
+
+class HartleyKangSettings(TypedDict, total=False):
+    """Of `methods.radial_curve.hartley_kang`."""
+
+    lens: str
+    skew: bool
+
+
+class FitzgibbonSettings(TypedDict, total=False):
+    """Of `methods.radial_curve.fitzgibbon`."""
+
+    lens: str
+    skew: bool

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from orthoscope.paper.claims import main_headline
 from orthoscope.paper.curves import curves_of
-from orthoscope.paper.entries import PAPER, fair_peers
+from orthoscope.paper.entries import every_lens, with_skew
 from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
     figures_with_claims,
@@ -21,7 +21,7 @@ from orthoscope.paper.figures_with_claims import (
 from orthoscope.paper.files import curves_csv, entries_csv, members_csv, table_csv, trials_csv
 from orthoscope.paper.page import paper_page
 from orthoscope.paper.photographs import straightened
-from orthoscope.paper.section4 import SCENES, Results
+from orthoscope.paper.section4 import PARTS, SCENES, Results
 
 __all__ = ["Documents", "documents"]
 
@@ -38,9 +38,10 @@ class Documents(NamedTuple):
 
 def documents(results: Results, files: Mapping[str, Path] | None = None) -> Documents:
     """The page and CSV files of a run; files: where the photographs are, for Fig. 7."""
-    shown = figures_with_claims(results)
+    plan, shown = results.plan, figures_with_claims(results)
     real = on_photographs(results)
-    fig7 = straightened(results.detections, files or {}) if results.detections else None
+    wanted = plan.only or PARTS
+    fig7 = straightened(results.detections, files or {}) if results.detections and "fig7" in wanted else None
     texts = {PAGE: paper_page(results, straightened=fig7)}
     texts |= {
         f"{exhibit.kind.name}.csv": curves_csv(exhibit.curves, exhibit.kind.axis.column)
@@ -51,12 +52,20 @@ def documents(results: Results, files: Mapping[str, Path] | None = None) -> Docu
             curves_of(results.outcomes, study="lenses", scene=scene), "noise_px"
         )
         for scene in SCENES
+        if plan.wants("lenses")
     }
-    texts["methods.csv"] = entries_csv((*PAPER, *fair_peers()), seed=results.plan.seed)
-    texts["eq7.csv"] = members_csv(results.members)
-    if real:
+    texts["methods.csv"] = entries_csv(plan.everyone(), seed=plan.seed)
+    if results.members:
+        texts["eq7.csv"] = members_csv(results.members)
+    if real and "table1" in wanted:
         texts["table1.csv"] = _table1(results)
-    texts["trials.csv"] = trials_csv((*results.outcomes, *results.on_photographs))
+    texts["trials.csv"] = trials_csv(
+        results.outcomes, (*plan.everyone(), *every_lens(plan.lenses)), seed=plan.seed
+    )
+    if results.on_photographs:
+        texts["trials_photographs.csv"] = trials_csv(
+            results.on_photographs, with_skew(plan.everyone()), seed=plan.seed
+        )
     return Documents(PAGE, _headline([*shown, *([real] if real else [])]), texts)
 
 

@@ -10,11 +10,15 @@ every method with every lens.
 
 from __future__ import annotations
 
+import importlib
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from orthoscope.evaluation.comparison.entry import parse_entry
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.methods import METHODS, calibrate
+from orthoscope.geometry.arrays import InputError
+from orthoscope.methods import METHODS, calibrate, settings_of
 from orthoscope.models.lenses import LENSES
 from orthoscope.targets.detections import Detections
 
@@ -32,6 +36,7 @@ __all__ = [
     "PaperEntry",
     "every_lens",
     "fair_peers",
+    "own_entry",
     "with_skew",
 ]
 
@@ -67,6 +72,17 @@ class PaperEntry(NamedTuple):
             return calibrate(detections, method=self.method, **self.settings)
         return self.method(detections, **self.settings)
 
+    @property
+    def called(self) -> str:
+        """The method's name."""
+        return self.method if isinstance(self.method, str) else getattr(self.method, "__name__", self.name)
+
+    def takes(self, setting: str) -> bool:
+        """Whether the method has a setting."""
+        if isinstance(self.method, str):
+            return setting in settings_of(self.method)
+        return setting in inspect.signature(self.method).parameters
+
 
 PAPER = (
     PaperEntry(FCCM, "fccm", {"lens": "brown:k1,k2"}),
@@ -89,14 +105,45 @@ def fair_peers() -> tuple[PaperEntry, ...]:
 
 
 def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[PaperEntry, ...]:
-    """Every method with every lens, the coefficients free that a user gets by naming it."""
+    """Every method that takes a lens with every lens, the coefficients free that a user gets by naming it."""
     return tuple(
         PaperEntry(f"{method} {lens}", method, {"lens": lens, **TOLD_SETTINGS.get(method, {})})
         for method in METHODS
+        if "lens" in settings_of(method)
         for lens in lenses
     )
 
 
 def with_skew(entries: tuple[PaperEntry, ...]) -> tuple[PaperEntry, ...]:
-    """The same, with oblique pixel axes allowed, as in the paper's Table 1."""
-    return tuple(entry._replace(settings={**entry.settings, "skew": True}) for entry in entries)
+    """The same, with oblique pixel axes allowed, as in the paper's Table 1, where the method can."""
+    return tuple(
+        entry._replace(settings={**entry.settings, "skew": True}) if entry.takes("skew") else entry
+        for entry in entries
+    )
+
+
+def own_entry(text: str) -> PaperEntry:
+    """A method of the user's own, or one of METHODS with settings, as `--with` names it.
+
+    Args:
+        text: `module:function`, a function that takes detections and returns a calibration; or what `compare`
+            takes, `fccm:brown:k1,k2`; either after `NAME=`.
+    Raises:
+        InputError: there is no such module, function, method or setting.
+    """
+    head, equals, tail = text.partition("=")
+    name, what = (head, tail) if equals and ":" not in head else (text, text)
+    module, _, attribute = what.partition(":")
+    if module in METHODS:
+        entry = parse_entry(what)
+        return PaperEntry(name, entry.method, entry.settings)
+    try:
+        function = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InputError(
+            f"--with {text!r} names no method ({error}); expected module:function with a function that takes"
+            f" detections, or one of {', '.join(METHODS)} as in fccm:brown:k1,k2."
+        ) from error
+    if not callable(function):
+        raise InputError(f"--with {text!r} is {function!r}; expected a function that takes detections.")
+    return PaperEntry(name if equals else attribute, function, {})

@@ -7,6 +7,7 @@ trial's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from orthoscope.paper.entries import MLDC, PAPER, PaperEntry, fair_peers
@@ -77,9 +78,9 @@ def member(
     return Eq7Search(scene, f"{damp} {damping:g}{weighed}", costs.last[1], judgement)
 
 
-def rivals(scene: str, *, condition: Condition, seed: int) -> list[Eq7Search]:
-    """What the other methods make of the same data; those of MLDC first."""
+def rivals(scene: str, *, condition: Condition, seed: int, own: Sequence[PaperEntry] = ()) -> list[Eq7Search]:
+    """What the other methods make of the same data; those of MLDC first, the user's own last."""
     data = simulated_trial(scene, condition, seed=seed, trial=0)
-    entries = [entry for entry in (*PAPER, *fair_peers()) if entry.name != MLDC]
-    order = sorted(entries, key=lambda entry: entry.method != "mldc")
+    entries = [entry for entry in (*PAPER, *fair_peers(), *own) if entry.name != MLDC]
+    order = sorted(entries, key=lambda entry: (entry.method != "mldc", entry in own))
     return [Eq7Search(scene, entry.name, float("nan"), trial_judged(entry, data)) for entry in order]

@@ -155,20 +155,20 @@ FIG6 = Kind(
 
 
 def figures_with_claims(results: Results) -> list[FigureWithClaims]:
-    """The simulated figures, in the paper's order."""
-    return [_exhibit(kind, results.outcomes) for kind in EXHIBITS]
+    """The simulated figures that were run, in the paper's order."""
+    made = [_exhibit(kind, results.outcomes) for kind in EXHIBITS]
+    return [exhibit for exhibit in made if exhibit.curves]
 
 
 def on_photographs(results: Results) -> FigureWithClaims | None:
     """Fig. 6; None without photographs."""
-    return _exhibit(FIG6, results.on_photographs) if results.detections else None
+    return _exhibit(FIG6, results.on_photographs) if results.on_photographs else None
 
 
 def _exhibit(kind: Kind, outcomes: Sequence[Outcome]) -> FigureWithClaims:
     curves = curves_of(outcomes, study=kind.study, scene=kind.scene)
-    return FigureWithClaims(
-        kind, curves, tuple(judge(kind.where, curves, kind.axis) for judge in kind.judges)
-    )
+    judges = kind.judges if curves else ()
+    return FigureWithClaims(kind, curves, tuple(judge(kind.where, curves, kind.axis) for judge in judges))
 
 
 def without_noise(results: Results) -> tuple[Claim, ...]:
@@ -178,11 +178,14 @@ def without_noise(results: Results) -> tuple[Claim, ...]:
             f"Section 4.1, {scene}", curves_of(results.outcomes, study="exact", scene=scene), POINTS
         )
         for scene in SCENES
+        if results.plan.wants("exact", scene)
     )
 
 
 def eq7_claims(results: Results) -> tuple[Claim, ...]:
-    """What the paper says of eq. (7)."""
+    """What the paper says of eq. (7); nothing where it was not searched."""
+    if not results.members:
+        return ()
     of_scenes = (
         claims_about_eq7.determined(f"Eq. (8), {scene}", [m for m in results.members if m.scene == scene])
         for scene in SCENES
@@ -229,6 +232,8 @@ def stable_centre(results: Results) -> tuple[Claim, ...]:
     paper = "The method guarantees stability also when the distortion centre is computed."
     said = []
     for scene in SCENES:
+        if not results.plan.wants("points", scene):
+            continue
         of_scene = {centre.name: centre for centre in centres(results) if centre.scene == scene}
         where, mldc = f"Section 5, {scene}", of_scene.get(MLDC)
         spread = {name: max(centre.x[1], centre.y[1]) for name, centre in of_scene.items()}

@@ -55,25 +55,31 @@ def curves_csv(curves: Curves, level: str) -> str:
     )
 
 
-def trials_csv(outcomes: Sequence[Outcome]) -> str:
-    """Every trial of every method: a row each."""
-    columns = ("study", "scene", "level", "method", "trial", *JUDGEMENT)
-    return table_csv(columns, ((o.study, o.scene, o.level, o.entry, o.trial, *o.judgement) for o in outcomes))
+def trials_csv(outcomes: Sequence[Outcome], entries: Sequence[PaperEntry], *, seed: int) -> str:
+    """Every trial of every method, a row each: errors, camera, and what makes the same row again.
+
+    Args:
+        outcomes: of the trials.
+        entries: who took part, for their settings.
+        seed: of the run.
+    """
+    columns = ("study", "scene", "level", "method", "trial", *JUDGEMENT, "settings", "seed", "orthoscope")
+    settings = {entry.name: _settings(entry) for entry in entries}
+    rows = (
+        (o.study, o.scene, o.level, o.entry, o.trial, *o.judgement, settings[o.entry], seed, __version__)
+        for o in outcomes
+    )
+    return table_csv(columns, rows)
 
 
 def entries_csv(entries: Sequence[PaperEntry], *, seed: int) -> str:
     """What each name stands for: method, settings, the seed of the run and the version that made it."""
-    rows = (
-        (
-            entry.name,
-            entry.method if isinstance(entry.method, str) else entry.method.__name__,
-            " ".join(f"{name}={value}" for name, value in entry.settings.items()),
-            seed,
-            __version__,
-        )
-        for entry in entries
-    )
+    rows = ((entry.name, entry.called, _settings(entry), seed, __version__) for entry in entries)
     return table_csv(("name", "method", "settings", "seed", "orthoscope"), rows)
+
+
+def _settings(entry: PaperEntry) -> str:
+    return " ".join(f"{name}={value}" for name, value in entry.settings.items())
 
 
 def members_csv(members: Sequence[Eq7Search]) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from orthoscope.files.images import read_image
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
-from orthoscope.paper.entries import OURS, PAPER, REPEATED, fair_peers, with_skew
+from orthoscope.paper.entries import OURS, PAPER, REPEATED, PaperEntry, with_skew
 from orthoscope.paper.subgrids import on_subgrid, subgrids
 from orthoscope.paper.trials import Outcome, Trial, trial_judged
 from orthoscope.straight.undistort import undistort
@@ -77,7 +77,11 @@ def split(detections: Detections, turn: int) -> tuple[Detections, Detections]:
 
 
 def split_outcomes(
-    detections: Detections, turn: int, *, grids: tuple[tuple[int, int] | None, ...]
+    detections: Detections,
+    turn: int,
+    *,
+    grids: tuple[tuple[int, int] | None, ...],
+    entries: tuple[PaperEntry, ...],
 ) -> list[Outcome]:
     """Every entry on every sub-grid of the training photographs of a split; tested on all corners of the
     others.
@@ -93,7 +97,7 @@ def split_outcomes(
             trial_judged(entry, Trial(on_subgrid(training, grid), test, test)),
         )
         for grid in grids
-        for entry in with_skew((*PAPER, *fair_peers()))
+        for entry in with_skew(entries)
     ]
 
 

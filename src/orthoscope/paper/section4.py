@@ -10,17 +10,31 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from orthoscope.geometry.arrays import InputError
 from orthoscope.models.lenses import LENSES
-from orthoscope.paper.entries import PAPER, every_lens, fair_peers
+from orthoscope.paper.entries import PAPER, PaperEntry, every_lens, fair_peers
 from orthoscope.paper.eq7_searches import ALIKE, DAMPINGS, WEIGHTS, Eq7Search, member, rivals
 from orthoscope.paper.photographs import SPLIT_COUNT, check_views, grids_of, split_outcomes
 from orthoscope.paper.subgrids import subgrids
-from orthoscope.paper.trials import Condition, Outcome, Study, trial_outcomes
+from orthoscope.paper.trials import TRAINING_VIEWS, Condition, Outcome, Study, trial_outcomes
+from orthoscope.simulation.scene import PAPER_FILL
 from orthoscope.targets.detections import Detections
 
-__all__ = ["PAPER_BOARD", "PAPER_NOISE_PX", "SCENES", "Plan", "Results", "run"]
+__all__ = [
+    "ON_PHOTOGRAPHS",
+    "PAPER_BOARD",
+    "PAPER_NOISE_PX",
+    "PARTS",
+    "SCENES",
+    "Part",
+    "Plan",
+    "Results",
+    "run",
+]
 
 SCENES = ("low", "high")
 # The paper's sheet has so many inner corners.
@@ -33,17 +47,56 @@ GRID_COUNT = 8
 Progress = Callable[[int, int], None]
 
 
+class Part(NamedTuple):
+    """What stands on its own in section 4: the study that it needs, and in which scenes."""
+
+    study: str
+    scenes: tuple[str, ...]
+
+
+# Studies that are not curves over trials of the simulation.
+SEARCHES, ON_PHOTOGRAPHS = "eq7", "photographs"
+# The figures and tables by the names of their files; whoever asks for some of them gets the studies of these.
+PARTS = {
+    "fig2": Part("noise", SCENES[:1]),
+    "fig3": Part("noise", SCENES[1:]),
+    "fig4": Part("points", SCENES[:1]),
+    "fig5": Part("points", SCENES[1:]),
+    "images_low": Part("images", SCENES[:1]),
+    "images_high": Part("images", SCENES[1:]),
+    "exact": Part("exact", SCENES),
+    "lenses": Part("lenses", SCENES),
+    "eq7": Part(SEARCHES, SCENES),
+    "fig6": Part(ON_PHOTOGRAPHS, ()),
+    "fig7": Part(ON_PHOTOGRAPHS, ()),
+    "table1": Part(ON_PHOTOGRAPHS, ()),
+}
+
+
 @dataclass(frozen=True)
 class Plan:
-    """How much is run: trials of figs. 2 to 5 and of the number of images; fewer for tables; which levels;
-    the seed of everything random.
+    """How much is run.
 
     Attributes:
+        trials: of figs. 2 to 5 and of the number of images; fewer for tables.
+        seed: of everything random.
         board: the sub-grid of the paper's board that all but the points' studies use, None for all of it.
-        points: sub-grids of the paper's board.
-        grids: how many of the photographed one.
+        noise_px: levels of figs. 2 and 3.
+        points: sub-grids of the paper's board, levels of figs. 4 and 5.
+        images: numbers of them.
         lenses: those that every method is tried with.
         dampings: of eq. (7), searched on data of condition eq7.
+        weights: of eq. (7), beside 1, 1, 1.
+        eq7: what data it is searched on.
+        grids: how many of the photographed board.
+        most_table_trials: of the table of lenses and of the noise-free check.
+        only: names of PARTS to run, all of them where none is named.
+        own: methods of the user's own, which take part in every figure.
+        tilt: least and greatest of the simulated views, radians.
+        fill: least and greatest share of the image that the simulated board has.
+    Raises:
+        InputError: a part that there is not, no level, a level that makes no sense, or two methods of one
+            name.
     """
 
     trials: int = 25
@@ -58,23 +111,62 @@ class Plan:
     eq7: Condition = Condition(PAPER_NOISE_PX)
     grids: int = GRID_COUNT
     most_table_trials: int = 5
+    only: tuple[str, ...] = ()
+    own: tuple[PaperEntry, ...] = ()
+    tilt: tuple[float, float] = (0.0, np.pi / 4)
+    fill: tuple[float, float] = PAPER_FILL
+
+    def __post_init__(self) -> None:
+        if unknown := [name for name in self.only if name not in PARTS]:
+            raise InputError(
+                f"{unknown[0]!r} is no part of the paper's section 4; expected one of {', '.join(PARTS)}."
+            )
+        if not self.noise_px or not all(0 <= sigma < np.inf for sigma in self.noise_px):
+            raise InputError(f"noise levels are {self.noise_px}; expected pixels, 0 or more.")
+        for columns, rows in self.points:
+            if not (3 <= columns <= PAPER_BOARD[0] and 3 <= rows <= PAPER_BOARD[1]):
+                raise InputError(
+                    f"a sub-grid of {columns} x {rows} points; expected 3 x 3 to"
+                    f" {' x '.join(map(str, PAPER_BOARD))}."
+                )
+        names = [entry.name for entry in self.everyone()]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise InputError(f"two methods are called {twice[0]!r}; expected a name for each. Rename yours.")
 
     @classmethod
-    def quick(cls, *, trials: int = 2, seed: int = 0) -> Plan:
-        """A look at everything in seconds: few levels, small boards, two dampings."""
-        return cls(
-            trials=trials,
-            seed=seed,
-            board=(6, 9),
-            noise_px=(0.0, 0.5),
-            points=((3, 4), (6, 9)),
-            images=(1, 4),
-            lenses=("brown",),
-            dampings=(DAMPINGS[0], DAMPINGS[3]),
-            eq7=Condition(PAPER_NOISE_PX, (5, 7), 5),
-            grids=2,
-            most_table_trials=1,
-        )
+    def quick(cls, **changes: Any) -> Plan:
+        """A look at everything in seconds: few levels, small boards, two dampings; changes: of a plan."""
+        few: dict[str, Any] = {
+            "trials": 2,
+            "board": (6, 9),
+            "noise_px": (0.0, 0.5),
+            "points": ((3, 4), (6, 9)),
+            "images": (1, 4),
+            "lenses": ("brown",),
+            "dampings": (DAMPINGS[0], DAMPINGS[3]),
+            "eq7": Condition(PAPER_NOISE_PX, (5, 7), 5),
+            "grids": 2,
+            "most_table_trials": 1,
+        }
+        return cls(**few | changes)
+
+    def everyone(self) -> tuple[PaperEntry, ...]:
+        """Who is compared in every figure: the paper's methods, ours, and the user's own."""
+        return (*PAPER, *fair_peers(), *self.own)
+
+    def wants(self, study: str, scene: str = "") -> bool:
+        """Whether a study, in a scene, is among what was asked for."""
+        parts = [PARTS[name] for name in self.only or PARTS]
+        return any(part.study == study and (not scene or scene in part.scenes) for part in parts)
+
+    def condition(
+        self,
+        noise_px: float = PAPER_NOISE_PX,
+        subgrid: tuple[int, int] | None = None,
+        views: int = TRAINING_VIEWS,
+    ) -> Condition:
+        """A condition with this plan's tilt and fill."""
+        return Condition(noise_px, subgrid, views, self.tilt, self.fill)
 
     @property
     def table_trials(self) -> int:
@@ -85,24 +177,20 @@ class Plan:
 
     def studies(self) -> tuple[tuple[Study, int], ...]:
         """Each study and its number of trials."""
-        everyone = (*PAPER, *fair_peers())
+        everyone, at = self.everyone(), self.condition
         noise = Study(
-            "noise", self.noise_px, tuple(Condition(noise, self.board) for noise in self.noise_px), everyone
+            "noise", self.noise_px, tuple(at(noise, self.board) for noise in self.noise_px), everyone
         )
         sizes = tuple(float(columns * rows) for columns, rows in self.points)
-        points = Study(
-            "points", sizes, tuple(Condition(PAPER_NOISE_PX, grid) for grid in self.points), everyone
-        )
+        points = Study("points", sizes, tuple(at(subgrid=grid) for grid in self.points), everyone)
         images = Study(
             "images",
             tuple(map(float, self.images)),
-            tuple(Condition(PAPER_NOISE_PX, self.board, m) for m in self.images),
+            tuple(at(subgrid=self.board, views=m) for m in self.images),
             everyone,
         )
-        exact = Study("exact", sizes[:1], (Condition(0.0, self.points[0]),), everyone)
-        lenses = Study(
-            "lenses", (PAPER_NOISE_PX,), (Condition(PAPER_NOISE_PX, self.board),), every_lens(self.lenses)
-        )
+        exact = Study("exact", sizes[:1], (at(0.0, self.points[0]),), everyone)
+        lenses = Study("lenses", (PAPER_NOISE_PX,), (at(subgrid=self.board),), every_lens(self.lenses))
         return (
             *((study, self.trials) for study in (noise, points, images)),
             *((study, self.table_trials) for study in (exact, lenses)),
@@ -132,22 +220,30 @@ def run(
     """Run a plan, and the paper's section 4.2 on detections where there are any.
 
     Args:
+        plan: what and how much.
+        detections: of photographs.
         executor: where trials run; by default here, one after the other.
         progress: called with (jobs done, jobs).
     Raises:
         CalibrationError: the photographs are too few.
+        InputError: only parts that need photographs were asked for, and there are none.
     """
     if detections:
         check_views(detections)
+    elif plan.only and all(PARTS[name].study == ON_PHOTOGRAPHS for name in plan.only):
+        raise InputError(f"{', '.join(plan.only)} need photographs. Hand them in: --photos PHOTOS.")
     simulated = [
         partial(trial_outcomes, study, scene, seed=plan.seed, trial=trial)
         for study, trials in plan.studies()
         for scene in SCENES
+        if plan.wants(study.name, scene)
         for trial in range(trials)
     ]
+    eq7_condition = plan.eq7._replace(tilt=plan.tilt, fill=plan.fill)
     eq7 = [
-        partial(_members, scene, searched, plan.eq7, plan.seed)
+        partial(_members, scene, searched, eq7_condition, plan.seed, plan.own)
         for scene in SCENES
+        if plan.wants(SEARCHES)
         for searched in (
             *((*damping, ALIKE) for damping in plan.dampings),
             *((*plan.dampings[0], weights) for weights in plan.weights),
@@ -156,10 +252,16 @@ def run(
     ]
     real = (
         [
-            partial(split_outcomes, detections, turn, grids=grids_of(detections, plan.grids))
+            partial(
+                split_outcomes,
+                detections,
+                turn,
+                grids=grids_of(detections, plan.grids),
+                entries=plan.everyone(),
+            )
             for turn in range(SPLIT_COUNT)
         ]
-        if detections
+        if detections and plan.wants(ON_PHOTOGRAPHS)
         else []
     )
     # long jobs first: no one waits for the last
@@ -175,10 +277,11 @@ def _members(
     searched: tuple[str, float, tuple[float, float, float]] | None,
     condition: Condition,
     seed: int,
+    own: tuple[PaperEntry, ...],
 ) -> list[Eq7Search]:
     """One search of eq. (7), or what the others make of its data."""
     if searched is None:
-        return rivals(scene, condition=condition, seed=seed)
+        return rivals(scene, condition=condition, seed=seed, own=own)
     return [member(scene, *searched, condition=condition, seed=seed)]
 
 

@@ -30,7 +30,7 @@ from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.paper.entries import PaperEntry
 from orthoscope.paper.subgrids import on_subgrid
-from orthoscope.simulation.scene import Scene, paper_scene, simulate_detections
+from orthoscope.simulation.scene import PAPER_FILL, Scene, paper_scene, simulate_detections
 from orthoscope.targets.detections import Detections
 
 __all__ = [
@@ -59,13 +59,21 @@ UNSEEN_SHARE = 0.01
 
 
 class Condition(NamedTuple):
-    """What training data a trial has: sigma in pixels, a sub-grid (columns, rows) or all corners, the number
-    of views.
+    """What data a trial has.
+
+    Attributes:
+        noise_px: sigma of training data.
+        subgrid: (columns, rows) of training data, None for all corners.
+        views: to compute from.
+        tilt: least and greatest, of all views, radians.
+        fill: least and greatest share of the image that the board has, of all views.
     """
 
     noise_px: float = 0.1
     subgrid: tuple[int, int] | None = None
     views: int = TRAINING_VIEWS
+    tilt: tuple[float, float] = (0.0, np.pi / 4)
+    fill: tuple[float, float] = PAPER_FILL
 
 
 class Study(NamedTuple):
@@ -131,16 +139,20 @@ class Outcome(NamedTuple):
 
 
 def trial_judged(entry: PaperEntry, trial: Trial) -> Judgement:
-    """Calibrate from the training views and judge on both; a CalibrationError is an outcome like any"
-    " other."""
+    """Calibrate from the training views and judge on both; a CalibrationError is an outcome like any other.
+
+    So is whatever else a function of the user's own raises: it shall not end a run of hours.
+    """
+    outcomes = CalibrationError if isinstance(entry.method, str) else Exception
     try:
         calibration = entry.calibrate(trial.training)
         camera = calibration.camera
         test_nce = evaluate_on(camera, trial.test).nce
         noisy_nce = test_nce if trial.noisy_test is trial.test else evaluate_on(camera, trial.noisy_test).nce
         unseen = _unseen(camera, trial.test)
-    except CalibrationError as error:
-        return Judgement(failure=str(error))
+    except outcomes as error:
+        told = "" if isinstance(error, CalibrationError) else f"{type(error).__name__}: "
+        return Judgement(failure=f"{told}{error}")
     K, frame = camera.intrinsics, camera.lens_frame or camera.intrinsics
     coefficients = dict(zip(camera.lens.names(), camera.lens.coefficients.tolist(), strict=True))
     return Judgement(
@@ -177,7 +189,7 @@ def simulated_trial(scene: str, condition: Condition, *, seed: int, trial: int) 
     The random numbers are those of SeedSequence(seed).spawn's child `trial`, whoever asks first.
     """
     noise, of_test = (_random(seed, trial, part) for part in (1, 2))
-    truth = papers_scene(scene, seed=seed, trial=trial)
+    truth = papers_scene(scene, condition, seed=seed, trial=trial)
     training, test = (
         replace(truth, camera_from_target=truth.camera_from_target[part])
         for part in (slice(TRAINING_VIEWS), slice(TRAINING_VIEWS, TRAINING_VIEWS + TEST_VIEWS))
@@ -189,9 +201,15 @@ def simulated_trial(scene: str, condition: Condition, *, seed: int, trial: int) 
     return Trial(thinned, exact, noisy if condition.noise_px else exact, test.camera_from_target)
 
 
-def papers_scene(scene: str, *, seed: int, trial: int) -> Scene:
+def papers_scene(scene: str, condition: Condition, *, seed: int, trial: int) -> Scene:
     """The camera, the target and all poses of a trial, those to compute from first."""
-    return paper_scene(scene, count=TRAINING_VIEWS + TEST_VIEWS, rng=_random(seed, trial, 0))
+    return paper_scene(
+        scene,
+        count=TRAINING_VIEWS + TEST_VIEWS,
+        rng=_random(seed, trial, 0),
+        tilt=condition.tilt,
+        fill=condition.fill,
+    )
 
 
 def _random(seed: int, trial: int, part: int) -> np.random.Generator:

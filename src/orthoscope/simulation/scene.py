@@ -24,7 +24,7 @@ from orthoscope.models.lenses import Brown
 from orthoscope.targets.detections import Detections, SetAside, View
 from orthoscope.targets.target import Target, chessboard
 
-__all__ = ["Scene", "paper_scene", "random_views", "simulate_detections"]
+__all__ = ["PAPER_FILL", "Scene", "paper_scene", "random_views", "simulate_detections"]
 
 # A whole board leaves a gap to the image's border of this share of the image's side.
 BORDER_SHARE = 0.01
@@ -130,7 +130,14 @@ def simulate_detections(
     )
 
 
-def paper_scene(distortion: str, *, count: int = 20, rng: np.random.Generator) -> Scene:
+def paper_scene(
+    distortion: str,
+    *,
+    count: int = 20,
+    rng: np.random.Generator,
+    tilt: tuple[float, float] = (0.0, np.pi / 4),
+    fill: tuple[float, float] = PAPER_FILL,
+) -> Scene:
     """The paper's simulated camera and target (section 4.1).
 
     The sheet is 210 x 297 mm with 14 x 20 inner corners, so 15 x 21 squares: 14 mm is the largest square that
@@ -141,6 +148,7 @@ def paper_scene(distortion: str, *, count: int = 20, rng: np.random.Generator) -
         distortion: `low` or `high`.
         count: how many views.
         rng: the source of the views.
+        tilt, fill: as `random_views` takes them.
     Raises:
         InputError: another word for the distortion.
     """
@@ -154,7 +162,7 @@ def paper_scene(distortion: str, *, count: int = 20, rng: np.random.Generator) -
         lens_frame=Intrinsics(750.0, 750.0, centre_x, centre_y),
     )
     target = chessboard(14, 20, 0.014)
-    return Scene(camera, target, random_views(camera, target, count, rng=rng, fill=PAPER_FILL))
+    return Scene(camera, target, random_views(camera, target, count, rng=rng, tilt=tilt, fill=fill))
 
 
 def random_views(

@@ -95,7 +95,7 @@ def test_the_size_of_the_straight_image_is_taken_up_by_the_pin_hole():
 def test_shrinking_the_straight_image_gains_nothing():
     detections = corners(NARROW, noise_px=0.1)
     observations = Observations.of(detections)
-    problem = Straightness(observations, SeenLines.of(observations, detections.target), ())
+    problem = Straightness.of(observations, SeenLines.of(observations, detections.target), ())
     own = Intrinsics(640.0, 640.0, 320.0, 240.0)
     small = Pfet(
         a1=4.0, a2=16 * -0.02, a3=64 * -0.1
@@ -110,7 +110,9 @@ def test_shrinking_the_straight_image_gains_nothing():
 def test_the_derivatives_of_straightness_are_exact_with_the_feet_moving():
     detections = corners(NARROW, views=2, noise_px=0.5)
     observations = Observations.of(detections)
-    problem = Straightness(observations, SeenLines.of(observations, BOARD), ("k1", "k2", "fx=fy", "cx", "cy"))
+    problem = Straightness.of(
+        observations, SeenLines.of(observations, BOARD), ("k1", "k2", "fx=fy", "cx", "cy")
+    )
     here = problem.start(Camera(SIZE, Intrinsics(600.0, 600.0, 310.0, 250.0), Brown(k1=-0.1)))
     sums = problem.linearise(here, Linear())
     rng = np.random.default_rng(0)

@@ -102,6 +102,7 @@ def fit_centred_lens(
     *,
     pinhole: Camera,
     lens: str = "pfet",
+    centre: tuple[float, float] | None = None,
     loss: Loss | None = None,
     options: Options | None = None,
 ) -> Solution[Camera]:
@@ -117,6 +118,7 @@ def fit_centred_lens(
         rays: any length.
         pinhole: its K says where they are seen straight; the lens it has does not matter.
         lens: as `parse_centred_lens` reads it.
+        centre: of distortion where it is known, pixels; it is found else.
     Raises:
         CalibrationError: the formula cannot see these rays.
         InputError: a lens that is none.
@@ -125,7 +127,8 @@ def fit_centred_lens(
     free = paired_parameters(kind, coefficients)
     K = pinhole.intrinsics
     focal = 0.5 * (K.fx + K.fy)
-    camera = replace(pinhole, lens_frame=Intrinsics(focal, focal, K.cx, K.cy))
+    free = free if centre is None else tuple(name for name in free if name not in CENTRE)
+    camera = replace(pinhole, lens_frame=Intrinsics(focal, focal, *(centre or (K.cx, K.cy))))
     lenses = (
         [_closed_form(rays, pixels, camera, free)]
         if kind is Pfet

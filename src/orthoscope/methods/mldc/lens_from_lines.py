@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +33,7 @@ from orthoscope.solve.least_squares import Options, Solution, shared_covariance,
 from orthoscope.solve.losses import Cauchy, Linear, Loss
 from orthoscope.targets.target import Target
 
-__all__ = ["MEASURES", "StraightLens", "fit_straight_lens"]
+__all__ = ["MEASURES", "StraightLens", "fit_straight_lens", "lens_of_lines"]
 
 # So many starts are followed to their end.
 STARTS_TRIED = 3
@@ -58,7 +59,7 @@ OWN_NAMES = {
 Lines = Any  # Straightness or StraightenedLines, each with unknowns of its own that have a `camera`
 # Where the distance of a corner from its line is measured.
 MEASURES: dict[str, Callable[[Observations, SeenLines, tuple[str, ...]], Lines]] = {
-    "photograph": Straightness,
+    "photograph": Straightness.of,
     "straight-image": StraightenedLines,
 }
 
@@ -99,11 +100,48 @@ def fit_straight_lens(
             corners.
     """
     lines = SeenLines.of(observations, target)
+    return lens_of_lines(
+        partial(MEASURES[measure], observations, lines),
+        image_size,
+        lens,
+        coefficients,
+        measure=measure,
+        loss=loss,
+        options=options,
+    )
+
+
+def lens_of_lines(
+    problem_of: Callable[[tuple[str, ...]], Lines],
+    image_size: tuple[int, int],
+    lens: type[Formula],
+    coefficients: tuple[str, ...],
+    *,
+    measure: str,
+    loss: Loss,
+    options: Options,
+    centre: bool = True,
+) -> StraightLens:
+    """The same for lines of any kind.
+
+    Args:
+        problem_of: the straightness of the lines over these parameters of the lens's own camera.
+        image_size: (width, height) pixels.
+        lens: the formula.
+        coefficients: those to free.
+        measure: of MEASURES, where distances are measured.
+        loss: how large errors count.
+        options: of the solver.
+        centre: whether the lens has a centre of its own; it stands at the image's else.
+    Raises:
+        CalibrationError: as `fit_straight_lens`.
+    """
 
     def problem(free: tuple[str, ...]) -> Lines:
-        return MEASURES[measure](observations, lines, tuple(OWN_NAMES.get(name, name) for name in free))
+        return problem_of(tuple(OWN_NAMES.get(name, name) for name in free))
 
     free = straightened_parameters(lens, coefficients)
+    free = free if centre else tuple(name for name in free if name not in CENTRE)
     shape = tuple(name for name in free if name not in CENTRE)
     starts = _likeliest(problem(free), image_size, lens)
     straight = _result(

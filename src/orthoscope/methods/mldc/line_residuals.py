@@ -21,12 +21,12 @@ curve itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from orthoscope.fitting.observations import Observations
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.models.camera import Camera
@@ -64,14 +64,26 @@ class Straightness:
     Corners stand one line after the other; one that lies on a row and a column stands twice.
     """
 
-    def __init__(self, observations: Observations, lines: SeenLines, free: Sequence[str]) -> None:
-        line, place = np.nonzero(lines.present)
+    def __init__(self, pixels: Float[ndarray, "2 n"], line: Int[ndarray, " n"], free: Sequence[str]) -> None:
+        """The problem for points of lines.
+
+        Args:
+            pixels: one line after the other.
+            line: the number of each one's line, from 0 up without gaps.
+            free: parameters of the lens's own camera.
+        """
         self.parameters = Parameters.of(free)
         self.free = self.parameters.names
         self._line = line
-        self._first = np.searchsorted(line, np.arange(len(lines.row)))
+        self._first = np.searchsorted(line, np.arange(line[-1] + 1))
+        self.pixels = pixels
+
+    @classmethod
+    def of(cls, observations: Observations, lines: SeenLines, free: Sequence[str]) -> Self:
+        """The problem for the rows and columns of a target."""
+        line, place = np.nonzero(lines.present)
         row, column = lines.row[line], lines.column[line, place]
-        self.pixels = np.stack([observations.u[row, column], observations.v[row, column]])
+        return cls(np.stack([observations.u[row, column], observations.v[row, column]]), line, free)
 
     @property
     def measurements(self) -> int:

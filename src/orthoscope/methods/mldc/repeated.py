@@ -118,9 +118,9 @@ def joint_parameters(of_pinhole: Sequence[str], lens: str) -> Parameters:
     """All that the two steps find: K's parameters, the lens's coefficients but for the gauge, and the"
     " centre."""
     kind, coefficients = parse_centred_lens(lens)
-    shape = tuple(name for name in coefficients if name != GAUGE.get(kind))
+    held = ("stretch", GAUGE.get(kind))
     return Parameters.of(
-        (*of_pinhole, *shape, *(CENTRE if CENTRE[0] in paired_parameters(kind, coefficients) else ()))
+        (*of_pinhole, *(name for name in paired_parameters(kind, coefficients) if name not in held))
     )
 
 
@@ -163,7 +163,9 @@ def _through_stages(bases: StartingCameras, nearest: Estimate, lens: str, loss: 
     """The first coefficients about the image's centre, then more of them."""
     kind, coefficients = parse_centred_lens(lens)
     stages = [tuple(name for name in stage if name in coefficients) for stage in STAGES]
-    stages = [stage for stage in stages if stage] or [coefficients[:1]]
+    shape = [name for name in joint_parameters((), lens).names if name not in CENTRE]
+    stages = [stage for stage in stages if stage] or [tuple(shape[:1])]
+    stages = [stage for stage in stages if stage]  # a lens may have nothing but a centre to be freed
     width, height = nearest.camera.image_size
     K = nearest.camera.intrinsics
     focal = 0.5 * (K.fx + K.fy)
