@@ -14,7 +14,7 @@ from orthoscope.evaluation.camera_error import CameraError, predicted_error, rms
 from orthoscope.evaluation.verdict.situation import FINE_PX
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.leave_one_out import leave_one_out
-from orthoscope.fitting.scatter import Scatter, likenesses, patterns_over_views, scatter_of
+from orthoscope.fitting.scatter import STRETCH_SHARE, Scatter, likenesses, patterns_over_views, scatter_of
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.decoupled.step_one import fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
@@ -84,6 +84,22 @@ def test_a_shift_undoes_less_where_the_target_stood_at_many_distances(noisy: Det
     one, many = (predicted_error(scatter, where, distance=to) for to in (0.5, spread))
     assert one.near_seen_px < many.near_seen_px < many.seen_px
     assert many.seen_px == one.seen_px
+
+
+def test_a_board_that_always_stands_upright_may_be_stretched_and_nobody_would_know():
+    """Its stretch is the pixels' aspect; boards turned in their plane tell the one from the other."""
+
+    def scatter(**roll: tuple[float, float]) -> Scatter:
+        return scattered(photographed_with(bowed(1e-3), NARROW, 8, noise_px=0.03, **roll), "free")
+
+    upright, turned = scatter(roll=(-0.02, 0.02)), scatter()
+    fx, fy = (upright.names.index(name) for name in ("fx", "fy"))
+    aspect = np.zeros(len(upright.stretch))
+    aspect[[fx, fy]] = 1.0 / NARROW.intrinsics.fx, -1.0 / NARROW.intrinsics.fy
+    open_upright, open_turned = (np.sqrt(aspect @ s.stretch @ aspect) for s in (upright, turned))
+    assert open_upright > 0.25 * STRETCH_SHARE  # views are tilted, and tell a part of it
+    assert open_turned < 0.3 * open_upright
+    assert (np.diag(upright.alike) >= np.diag(upright.model)).all()
 
 
 @pytest.mark.slow

@@ -120,8 +120,12 @@ class _Variances:
         self.views = (draws * self.views + ALIKE_DRAWS * self.alike) / (draws + ALIKE_DRAWS)
         self.bias = np.zeros(len(rays))
         if rich is not None:
+            of_rich = _settled(rich, rays, fitted, distance)
+            if not scatter.stretch.any():  # a target that is taken for flat hides a stretch as well
+                hidden = _spread(of_rich, rich.stretch)
+                self.alike, self.views = self.alike + hidden, self.views + hidden
             apart = difference_of_images(rich.camera, scatter.camera, rays, rays[:fitted], distance=distance)
-            both = by_view - _settled(rich, rays, fitted, distance) @ rich.left_out.T
+            both = by_view - of_rich @ rich.left_out.T
             by_chance = np.nansum(both**2, axis=(1, 2))
             self.apart, self.by_chance = np.nan_to_num((apart**2).sum(1)), by_chance
             self.bias = np.maximum(self.apart - by_chance, 0.0)
