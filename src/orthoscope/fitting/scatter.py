@@ -22,7 +22,7 @@ the larger of the two is believed (camera_error.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -112,32 +112,29 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
 def _by_stretch(fit: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray, "d d"]:
     """What is added to the camera's covariance where the shape's prior is no surer of stretch and shear than
     STRETCH_SHARE; nothing where views show them, or where the prior is no surer.
-
-    With w'x how much of a mode is in the unknowns, and H less `excess` w w': the Woodbury identity.
     """
+    none, (k, g, r, _) = np.zeros((fit.of_camera, fit.of_camera)), fit.slopes.sizes
     surface = fit.slopes.surface
-    r = surface.shape[1]
     if not r or fit.noise <= 0.0:
-        return np.zeros((fit.of_camera, fit.of_camera))
+        return none
     seen = np.any(surface != 0.0, axis=1)
     (x, y), zero = ((points[:, :2] - points[seen, :2].mean(0)) * seen[:, None]).T, np.zeros(len(points))
-    precision, ways, excess = fit.shape_precision[: 3 * r], [], []
+    shape = slice(k + 2 * g, k + 2 * g + 3 * r)
+    A, precision, is_surer = fit.normal.A.copy(), fit.shape_precision[: 3 * r], False
     for mode in (np.stack([x, -y, zero]), np.stack([y, x, zero])):
         unit = np.linalg.lstsq(surface, 0.5 * mode.T, rcond=None)[0].ravel()
-        known = float(unit @ (precision * unit))  # of the mode, by the prior
-        more = known - fit.noise / STRETCH_SHARE**2
-        if more > 0.0:
-            way = np.zeros(fit.unknowns)
-            way[fit.of_camera : fit.of_camera + 3 * r] = precision * unit / known
-            ways.append(way)
-            excess.append(more)
-    if not ways:
-        return np.zeros((fit.of_camera, fit.of_camera))
-    W = np.stack(ways, axis=1)
-    solved = fit.solved(W)
-    left = np.diag(1.0 / np.array(excess)) - W.T @ solved
-    camera = solved[: fit.of_camera]
-    return fit.noise * camera @ np.linalg.solve(left, camera.T)
+        known = float(unit @ (precision * unit))  # of how much of the mode there is, by the prior
+        excess = known - fit.noise / STRETCH_SHARE**2
+        if excess > 0.0:
+            share = precision * unit / known
+            A[shape, shape] -= excess * np.outer(share, share)
+            is_surer = True
+    if not is_surer:
+        return none
+    looser = replace(fit, normal=fit.normal._replace(A=A))
+    added = looser.camera_covariance - fit.camera_covariance
+    value, vector = np.linalg.eigh(0.5 * (added + added.T))
+    return (vector * np.maximum(value, 0.0)) @ vector.T
 
 
 def patterns_over_views(
