@@ -38,7 +38,7 @@ COPY_SIDES = (640, 320, 1280, 2560)
 # So many lattices of each copy are looked at, since a chequered shirt may be larger than the board.
 LATTICES_PER_COPY = 2
 # A part of a board has at least this many corners.
-FEWEST_CORNERS = 6
+FEWEST_PART_CORNERS = 6
 # At least this share of the board's corners hangs together, or trying other finders is not worth while.
 ENOUGH_CORNERS_SHARE = 0.25
 # More than this many times the board's corners are a tiled floor, not a board.
@@ -90,7 +90,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         if sight and len(sight.ids) == board.columns * board.rows:
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in others)
             return sight._replace(remark=TWICE) if alike else sight
-        parts += [sight] if sight and len(sight.ids) >= FEWEST_CORNERS else []
+        parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: len(sight.ids), default=None)
     count = board.columns * board.rows
     if ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count and (
@@ -106,7 +106,7 @@ def _in_photograph(
     grey: ndarray, copy: ndarray, found: CornerLattice, board: Chessboard | MarkedChessboard
 ) -> Grid | None:
     """The grid of a copy's lattice, in the photograph's pixels; None where nothing is left of it."""
-    grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_CORNERS else None
+    grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_PART_CORNERS else None
     return grid and grid._replace(corners=to_photograph(grid.corners, copy, grey))
 
 
