@@ -1,4 +1,4 @@
-"""One word a thing: no public name has two meanings, docstrings name what is there, constants say it whole."""
+"""One word a thing: public names have one meaning, docstrings name what is there, constants say it whole."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "target",
-        lambda s: s.target_px > 0.0,
+        lambda s: s.target_px > 0.0,  # where misfit/f_test.py takes it for one
         _as_far_as_it_goes,
         lambda s: f"{_target(s)}: in every photograph its corners are off by the same {s.target_mm:.2g} mm",
     ),
