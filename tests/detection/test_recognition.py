@@ -40,6 +40,23 @@ def photographs(spec: str, count: int) -> dict[str, np.ndarray]:
     return {f"{i}": RENDERER.photograph(target, pose, rng=rng) for i, pose in enumerate(views)}
 
 
+@pytest.mark.slow  # every dictionary is tried on every square
+def test_a_board_without_a_white_margin_is_known_by_the_size_that_comes_again():
+    """Its sides are not seen: the squares at the rim meet black as well as white."""
+    squares = np.kron(np.indices((7, 10)).sum(0) % 2, np.ones((40, 40))).astype(np.uint8) * 200 + 20
+    rng, sheet = np.random.default_rng(3), np.float32([[0, 0], [400, 0], [400, 280], [0, 280]])
+    views = {}
+    for i in range(4):
+        place = np.float32([[120, 100], [520, 110], [510, 390], [130, 380]]) + rng.uniform(-40, 40, (4, 2))
+        plane = cv2.getPerspectiveTransform(sheet, place.astype(np.float32))
+        inside = cv2.warpPerspective(np.ones_like(squares), plane, (640, 480))
+        drawn = np.where(inside, cv2.warpPerspective(squares, plane, (640, 480)), 20)
+        views[str(i)] = cv2.GaussianBlur(drawn.astype(np.uint8), (0, 0), 0.8)
+    found = recognise(views)
+    assert found.target.name == "chessboard:9x6:25mm"
+    assert found.seen == 4
+
+
 @pytest.mark.parametrize("spec", [*QUICK, *(pytest.param(spec, marks=pytest.mark.slow) for spec in SLOW)])
 def test_photographs_say_which_board_they_show(spec):
     found = recognise(photographs(spec, 1))

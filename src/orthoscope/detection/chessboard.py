@@ -155,6 +155,17 @@ def board_size(grey: ndarray, *, whole: bool = True) -> tuple[int, int] | None:
     return None
 
 
+def lattice_sizes(grey: ndarray) -> set[tuple[int, int]]:
+    """The columns and rows of all lattices in a photograph that may be boards, the larger first.
+
+    Args:
+        grey: (h,w) uint8.
+    """
+    grids = (laid_out(copy, found, max(found.size)) for found, copy, _ in _hanging_together(grey))
+    sizes = (sorted(grid.seen.shape) for grid in grids if grid)
+    return {(columns, rows) for rows, columns in sizes if rows > 2}
+
+
 def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, list[CornerLattice]]]:
     """The largest lattices of each copy, the copy, and the lattices of it that are smaller."""
     shapes = set()

@@ -22,9 +22,7 @@ from orthoscope.fitting.held_out import FEWEST_VIEWS, held_out, rms_and_error
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods import METHODS
 
-__all__ = ["USUAL_FOLDS", "UnseenViews", "in_folds", "in_turn"]
-
-USUAL_FOLDS = 5  # of a method that leaves no view out by itself
+__all__ = ["UnseenViews", "in_folds", "in_turn"]
 
 
 class UnseenViews(NamedTuple):

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from orthoscope.detection.chessboard import board_size
+from orthoscope.detection.chessboard import board_size, lattice_sizes
 from orthoscope.detection.recognition.disc_layout import disc_boards
 from orthoscope.detection.recognition.marker_layout import marker_boards
 from orthoscope.detection.sight import Sight
@@ -23,6 +23,8 @@ __all__ = ["Recognised", "recognise"]
 
 # So many photographs are looked at, evenly picked.
 LOOKED_AT = 8
+# Lattices of one size in fewer photographs agree by chance.
+ENOUGH_TO_AGREE = 3
 # A square of a chessboard, as it is described, metres.
 NOMINAL = 0.025
 
@@ -70,7 +72,8 @@ def recognise(photographs: Given, *, most_megapixels: float = MOST_MEGAPIXELS) -
     if best is None:
         raise CalibrationError(
             f"none of {len(greys)} photographs shows a chessboard whose four sides are seen, markers in a"
-            " known layout, or a grid of discs. Say which target it is, or photograph the whole of it."
+            " known layout, or a grid of discs, nor is a chessboard of one size in most of them. Say which"
+            " target it is, or photograph the whole of it."
         )
     return Recognised(best[2], best[0], len(greys))
 
@@ -94,7 +97,7 @@ def _candidates(greys: Sequence[ndarray]) -> Iterator[Board]:
         greys
     ):  # squares of a plain board take long to be no markers
         yield from marker_boards(greys)
-    sizes = [size for size, _ in whole.most_common(2)] or [_at_least(greys)]
+    sizes = [size for size, _ in whole.most_common(2)] or _again_and_again(greys) or [_at_least(greys)]
     for columns, rows in sizes:
         if min(columns, rows) >= 4:
             yield MarkedChessboard(columns, rows, NOMINAL)
@@ -102,6 +105,14 @@ def _candidates(greys: Sequence[ndarray]) -> Iterator[Board]:
         if min(columns, rows) >= 3:
             yield Chessboard(columns, rows, NOMINAL)
     yield from disc_boards(greys)
+
+
+def _again_and_again(greys: Sequence[ndarray]) -> list[tuple[int, int]]:
+    """The size of the lattice that is in most photographs, for boards without a white margin, whose sides are
+    not seen: what does not belong to a board changes its size from one photograph to the next.
+    """
+    sizes = Counter(size for grey in greys for size in lattice_sizes(grey))
+    return [size for size, seen in sizes.most_common(1) if seen >= max(ENOUGH_TO_AGREE, 0.5 * len(greys))]
 
 
 def _at_least(greys: Sequence[ndarray]) -> tuple[int, int]:
