@@ -48,7 +48,7 @@ def off_smooth_grid(
         pixels: the corners.
         places: column and row of each in the lattice.
         step: from a corner to the next, pixels.
-        doubtful: which are off sooner, by half of that.
+        doubtful: which are off sooner, by half of that; in a good picture only these can be.
         poor: whether the picture's noise, not lens or board, makes the residuals.
     """
     none = np.zeros(len(pixels), dtype=bool), pixels.copy(), np.inf
@@ -67,7 +67,7 @@ def off_smooth_grid(
         usual = float(np.median(residual[~off]))
         limit = max((TIMES_NOISE if poor else TIMES_USUAL) * usual, LEAST_PX, LEAST_STEP_SHARE * step)
         limit = min(limit, max(MOST_PX, MOST_STEP_SHARE * step)) if poor else limit
-        counted = np.where(off, 0.0, residual * np.where(doubtful, DOUBTFUL_TIMES, 1.0))
+        counted = np.where(off, 0.0, residual * np.where(doubtful, DOUBTFUL_TIMES, float(poor)))
         if counted.max() <= limit:
             break
         off[counted.argmax()] = True
