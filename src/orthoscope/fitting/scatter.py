@@ -22,7 +22,7 @@ the larger of the two is believed (camera_error.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -112,29 +112,27 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
 def _by_stretch(fit: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray, "d d"]:
     """What is added to the camera's covariance where the shape's prior is no surer of stretch and shear than
     STRETCH_SHARE; nothing where views show them, or where the prior is no surer.
+
+    With W'x how much of each mode there is, P what the prior knows of them, so that (W'H^-1 W)^-1 = D + P with
+    D what the views know: P - E in its place adds H^-1 W (E + E (D + P - E)^-1 E) W'H^-1.
     """
-    none, (k, g, r, _) = np.zeros((fit.of_camera, fit.of_camera)), fit.slopes.sizes
-    surface = fit.slopes.surface
+    r, surface = fit.slopes.sizes[2], fit.slopes.surface
     if not r or fit.noise <= 0.0:
-        return none
+        return np.zeros((fit.of_camera, fit.of_camera))
     seen = np.any(surface != 0.0, axis=1)
     (x, y), zero = ((points[:, :2] - points[seen, :2].mean(0)) * seen[:, None]).T, np.zeros(len(points))
-    shape = slice(k + 2 * g, k + 2 * g + 3 * r)
-    A, precision, is_surer = fit.normal.A.copy(), fit.shape_precision[: 3 * r], False
-    for mode in (np.stack([x, -y, zero]), np.stack([y, x, zero])):
+    precision, W, known = fit.shape_precision[: 3 * r], np.zeros((fit.unknowns, 2)), np.zeros(2)
+    for i, mode in enumerate((np.stack([x, -y, zero]), np.stack([y, x, zero]))):
         unit = np.linalg.lstsq(surface, 0.5 * mode.T, rcond=None)[0].ravel()
-        known = float(unit @ (precision * unit))  # of how much of the mode there is, by the prior
-        excess = known - fit.noise / STRETCH_SHARE**2
-        if excess > 0.0:
-            share = precision * unit / known
-            A[shape, shape] -= excess * np.outer(share, share)
-            is_surer = True
-    if not is_surer:
-        return none
-    looser = replace(fit, normal=fit.normal._replace(A=A))
-    added = looser.camera_covariance - fit.camera_covariance
-    value, vector = np.linalg.eigh(0.5 * (added + added.T))
-    return (vector * np.maximum(value, 0.0)) @ vector.T
+        known[i] = unit @ (precision * unit)
+        W[fit.of_camera : fit.of_camera + 3 * r, i] = precision * unit / known[i]
+    solved = fit.solved(W)
+    excess = np.diag(np.maximum(known - fit.noise / STRETCH_SHARE**2, 0.0))
+    by_views, vectors = np.linalg.eigh(np.linalg.inv(W.T @ solved) - np.diag(known))
+    data = (vectors * np.maximum(by_views, 0.0)) @ vectors.T  # rounding may leave less than nothing
+    added = excess + excess @ np.linalg.solve(data + np.diag(known) - excess, excess)
+    camera = solved[: fit.of_camera]
+    return fit.noise * camera @ (0.5 * (added + added.T)) @ camera.T
 
 
 def patterns_over_views(
