@@ -113,8 +113,8 @@ def _by_stretch(fit: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray
     """What is added to the camera's covariance where the shape's prior is no surer of stretch and shear than
     STRETCH_SHARE; nothing where views show them, or where the prior is no surer.
 
-    With W'x how much of each mode there is, P what the prior knows of them, so that (W'H^-1 W)^-1 = D + P with
-    D what the views know: P - E in its place adds H^-1 W (E + E (D + P - E)^-1 E) W'H^-1.
+    W'x is how much of each mode there is, P what the prior knows of them, D what the views know, so that
+    (W'H^-1 W)^-1 = D + P.  P - E in the place of P adds H^-1 W (E + E (D + P - E)^-1 E) W'H^-1.
     """
     r, surface = fit.slopes.sizes[2], fit.slopes.surface
     if not r or fit.noise <= 0.0:
