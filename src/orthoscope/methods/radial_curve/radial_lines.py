@@ -30,11 +30,11 @@ __all__ = ["GridView", "RadialView", "centre_of_distortion", "grid_views", "radi
 # A view needs so many corners: its radial fundamental matrix has eight unknowns.
 FEWEST_CORNERS = 8
 # The centre is moved so often at most; a move below this, pixels, is none.
-MOVES, SETTLED_PX = 30, 1e-5
+MOVES, SETTLED_PX = 12, 1e-4
 # Slopes by the centre are differences over so much, pixels.
 NUDGE_PX = 0.2
 # The rows of a homography are fitted so often, each time with the distances of the last.
-WEIGHINGS = 3
+WEIGHINGS = 2
 # A centre this much of the diagonal beyond the frame is none.
 OUTSIDE = 0.25
 
