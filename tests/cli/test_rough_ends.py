@@ -12,6 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -176,3 +177,13 @@ def test_without_opencv_one_is_told_what_to_install(run, monkeypatch):
     told = run("tools")
     assert told.code == 2
     assert "pip install 'orthoscope[opencv]'" in told.err
+
+
+def test_reasons_stand_one_below_the_other_and_names_stay_on_their_line(run, tmp_path):
+    for name in ("one.png", "two\x1b[2J.png"):
+        cv2.imwrite(str(tmp_path / name), np.full((60, 80), 90, np.uint8))
+    told = run("detect", tmp_path, "--target", "chessboard:9x6:25mm", "-o", tmp_path / "corners.json")
+    first, *listed = told.err.splitlines()[-3:]
+    assert told.code == 1
+    assert first.startswith("orthoscope: chessboard:9x6:25mm was found in none of 2 photographs")
+    assert [line.split(":")[0] for line in listed] == ["  one.png", "  two\\x1b[2J.png"]

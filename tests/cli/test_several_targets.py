@@ -44,3 +44,16 @@ def test_each_target_that_is_named_has_a_view_of_each_photograph_and_a_part_in_t
     assert names == [f"{number}.png:board{board}" for number in range(4) for board in (1, 2)]
     assert abs(calibration.camera.intrinsics.fx - 600.0) < 2.0
     assert "0.png:board2" in (tmp_path / "camera" / "report.html").read_text()
+
+
+def test_auto_says_which_target_is_seen_and_calibrate_what_to_say(run, tmp_path):
+    board = parse_target("chessboard:7x5:25mm")
+    rotation = rotation_from_vector(np.array([0.3, 0.1, 0.0]))
+    pose = Pose(rotation, np.array([-0.07, -0.05, 0.3]))
+    write_image(tmp_path / "a.png", Renderer(CAMERA).photograph(board, pose, rng=np.random.default_rng(0)))
+    done = run("detect", tmp_path / "a.png", "--target", "auto")
+    assert done.code == 0
+    assert "target     chessboard:7x5:25mm\n" in done.out
+    refused = run("calibrate", tmp_path / "a.png", "--target", "auto", "-o", tmp_path / "camera")
+    assert refused.code == 2
+    assert "chessboard:7x5:25mm" in refused.err

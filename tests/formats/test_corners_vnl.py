@@ -145,6 +145,10 @@ def test_a_name_that_the_table_cannot_hold_is_refused(tmp_path, name):
 
 
 FAULTS = {
+    "a legend with more columns than its rows have": (
+        "# filename a b x y level\na.jpg 1 2 0\n",
+        r"line 2, has 4 columns; expected 6 with 'y' among them",
+    ),
     "another number of corners": (
         "# filename x y level\n\n" + corners(count=5),
         r"lines 3 to 7: 'a.jpg' has 5 corners; .*3x2:100mm' has 6",

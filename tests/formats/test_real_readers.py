@@ -10,6 +10,8 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -28,23 +30,65 @@ from orthoscope.formats.table import FORMATS
 PYTHONS = [sys.executable, *filter(Path.exists, map(Path, ("/usr/bin/python3",)))]
 
 
-def python_with(module: str) -> str:
-    """An interpreter that can import a module; skips the test where none can."""
+# Runs a script again for each line of arguments, so that the tool is imported once.
+AGAIN = """
+import json, sys
+code = compile(sys.argv[1], "reader", "exec")
+for line in sys.stdin:
+    sys.argv[1:] = json.loads(line)
+    exec(code)
+    print(flush=True)
+"""
+
+
+@cache
+def python_with(module: str) -> str | None:
+    """An interpreter that can import a module; None where there is none."""
     for python in PYTHONS:
-        if (
-            subprocess.run([python, "-c", f"import {module}"], capture_output=True, check=False).returncode
-            == 0
-        ):
+        found = subprocess.run([python, "-c", f"import {module}"], capture_output=True, check=False)
+        if found.returncode == 0:
             return python
-    pytest.skip(f"no Python here has {module}; .ci/run installs it")
+    return None
 
 
-def answer(module: str, script: str, *arguments: Path | str) -> list:
-    """What a script prints as JSON, run where the module is."""
-    command = [python_with(module), "-c", script, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.strip().splitlines()[-1])
+class Readers:
+    """Scripts under way, each in a Python that has its tool."""
+
+    def __init__(self):
+        self._processes: dict[str, subprocess.Popen[str]] = {}
+
+    def __call__(self, module: str, script: str, *arguments: Path | str) -> list:
+        """What a script prints as JSON, run where the module is; skips the test where it is nowhere."""
+        python = python_with(module)
+        if python is None:
+            pytest.skip(f"no Python here has {module}; .ci/run installs it")
+        if script not in self._processes:
+            self._processes[script] = subprocess.Popen(
+                [python, "-c", AGAIN, script],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+        process = self._processes[script]
+        process.stdin.write(json.dumps([str(argument) for argument in arguments]) + "\n")
+        process.stdin.flush()
+        said = []
+        while (line := process.stdout.readline()) not in ("", "\n"):
+            said.append(line)
+        assert line, self._processes.pop(script).communicate()[1]
+        return json.loads(said[-1])
+
+    def close(self) -> None:
+        for process in self._processes.values():
+            process.communicate()
+
+
+@pytest.fixture(scope="module")
+def answer() -> Iterator[Readers]:
+    readers = Readers()
+    yield readers
+    readers.close()
 
 
 def rays_of(camera) -> np.ndarray:
@@ -70,7 +114,7 @@ print(json.dumps([mrcal.project(rays, *model.intrinsics()).tolist(), list(map(in
 
 
 @holdings("mrcal")
-def test_mrcal_projects_as_we_do(tmp_path, holding):
+def test_mrcal_projects_as_we_do(tmp_path, holding, answer):
     camera = camera_held(FORMATS["mrcal"], holding)
     trusted = np.array([[10.0, 10.0], [600.0, 20.0], [300.0, 200.0], [20.0, 450.0], [610.0, 440.0]])
     export(Contents(camera, trusted=trusted), tmp_path / "a.cameramodel", "mrcal")
@@ -88,7 +132,7 @@ print(json.dumps([info.width, info.height, info.distortion_model, list(info.D), 
 
 
 @holdings("ros")
-def test_ross_own_parser_reads_every_number(tmp_path, holding):
+def test_ross_own_parser_reads_every_number(tmp_path, holding, answer):
     camera = camera_held(FORMATS["ros"], holding)
     export(camera, tmp_path / "a.yaml", "ros")
     width, height, model, D, K, P = answer("camera_calibration_parsers", ROS, tmp_path / "a.yaml")
@@ -114,7 +158,7 @@ print(json.dumps([pixels.tolist(), [camera.width, camera.height], poses]))
 
 @holdings("colmap")
 @pytest.mark.parametrize("suffix", FORMATS["colmap"].suffixes)
-def test_colmap_projects_as_we_do_and_has_our_poses(tmp_path, holding, suffix):
+def test_colmap_projects_as_we_do_and_has_our_poses(tmp_path, holding, suffix, answer):
     camera = camera_held(FORMATS["colmap"], holding)
     export(Contents(camera, poses()), tmp_path / f"cameras{suffix}", "colmap")
     rays = rays_of(camera)
@@ -139,7 +183,7 @@ print(json.dumps(modifier.apply_geometry_distortion().reshape(height, width, 2)[
 
 @holdings("lensfun")
 @pytest.mark.parametrize("aspect", ["", "3:2", "639:479"])
-def test_lensfun_straightens_as_we_do(tmp_path, holding, aspect):
+def test_lensfun_straightens_as_we_do(tmp_path, holding, aspect, answer):
     """Its places are rough by .02 px from one pixel to the next (fast square roots in single precision)."""
     path = tmp_path / "lens.xml"
     export(camera_held(FORMATS["lensfun"], holding), path, "lensfun")

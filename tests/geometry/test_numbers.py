@@ -11,6 +11,7 @@ from orthoscope.geometry.numbers import (
     percent,
     pixels,
     probability,
+    rough_pixels,
     setting,
     six_digits,
     value_with_deviation,
@@ -61,6 +62,14 @@ def test_a_value_ends_where_its_deviation_has_its_second_digit(value, deviation,
 )
 def test_a_number_ends_where_its_error_has_its_second_digit(value, error, text):
     assert with_error(value, error) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(123.4, "123"), (9.87, "9.9"), (0.0951, "0.095"), (0.0949, "0.09"), (0.002, "0.01")],
+)
+def test_a_sentence_says_pixels_with_two_digits_and_no_less_than_a_hundredth(value, text):
+    assert rough_pixels(value) == text
 
 
 def test_a_parameter_whose_error_nobody_knows_has_six_digits():

@@ -111,6 +111,10 @@ def main() -> None:
         _leave(error)
 
 
+# Messages list photographs with reasons, each on a line of its own after this; any other line end is escaped.
+LISTED = "\n  "
+
+
 def _leave(error: Exception) -> None:
     """Exit with the message and code of an error of ours; any other is a defect and keeps its traceback."""
     from concurrent.futures import BrokenExecutor
@@ -130,7 +134,8 @@ def _leave(error: Exception) -> None:
         sys.exit(1)
     if not isinstance(error, InputError | CalibrationError):
         raise error
-    tell(f"orthoscope: {error}", err=True)
+    first, *listed = str(error).split(LISTED)
+    tell(f"orthoscope: {first}", *(f"  {line}" for line in listed), err=True)
     sys.exit(2 if isinstance(error, InputError) else 1)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
@@ -49,13 +50,19 @@ def detect(
     out: Path,
     as_json: bool,
 ) -> None:
-    """Find the target's corners in photographs (or turn a corners.vnl table into detections.json)."""
+    """Find the target's corners in photographs (or turn a corners.vnl table into detections.json).
+
+    With --target auto say which target the photographs show, and write nothing.
+    """
     from orthoscope.cli.executors import threads
-    from orthoscope.cli.inputs import detections_from
+    from orthoscope.cli.inputs import AUTO, detections_from
     from orthoscope.cli.progress import bar
     from orthoscope.files.whole_files import check_folder
     from orthoscope.formats.own.json import save, text_of
 
+    if target == AUTO:
+        _recognise(photos, as_json=as_json)
+        return
     check_folder(out.parent)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         detections, _ = detections_from(
@@ -81,3 +88,15 @@ def detect(
     for remark in detections.remarks:
         tell(f"remark     {remark.image}: {remark.words}")
     tell(f"wrote      {out}")
+
+
+def _recognise(photos: tuple[str, ...], *, as_json: bool) -> None:
+    """Say which target photographs show."""
+    from orthoscope.detection.recognition.recognise import recognise
+
+    found = recognise(photos)
+    if as_json:
+        numbers = {"target": found.target.name, "seen": found.seen, "looked_at": found.looked_at}
+        tell_json(json.dumps(numbers, indent=2))
+        return
+    tell(f"target     {found.target.name}", f"seen       {found.sentence}")

@@ -17,7 +17,10 @@ from orthoscope.targets.detections import Detections, photograph_of
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
-__all__ = ["detections_from"]
+__all__ = ["AUTO", "detections_from"]
+
+# What `--target` says where nobody knows which target it is.
+AUTO = "auto"
 
 
 def detections_from(
@@ -45,8 +48,12 @@ def detections_from(
     if target is None:
         raise InputError(
             "no target was named; say what was photographed, such as --target chessboard:9x6:25mm (inner"
-            " corners, square)."
+            " corners, square). `orthoscope detect PHOTOS --target auto` says which it seems to be."
         )
+    if target == AUTO:
+        from orthoscope.detection.recognition.recognise import recognise
+
+        raise InputError(f"--target {AUTO} only says what is seen: {recognise(paths).sentence}.")
     target = parse_target(target) if isinstance(target, str) else target
     if len(paths) == 1 and Path(paths[0]).suffix == ".vnl":
         if image_size is None:

@@ -147,7 +147,8 @@ target: Decorator = click.option(
     help=(
         "What was photographed, once for each board that the photographs show: chessboard:COLUMNSxROWS:SQUARE, counting inner corners, e.g."
         " chessboard:9x6:25mm; charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:legacy], counting squares;"
-        " aprilgrid:COLUMNSxROWS:TAG:SPACING, counting tags; or a target.yaml of Kalibr."
+        " aprilgrid:COLUMNSxROWS:TAG:SPACING, counting tags; or a target.yaml of Kalibr; docs/targets.md has"
+        " all kinds. auto says which it seems to be."
     ),
 )
 image_size: Decorator = click.option(

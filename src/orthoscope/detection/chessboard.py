@@ -99,7 +99,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         best = _by_opencv(grey, board) or best
     if best:
         return best
-    return Unseen("only a part of it was seen, which may be several" if open_ else "was not found in it")
+    return Unseen("is in it in part only, and which part cannot be told" if open_ else "was not found in it")
 
 
 def _in_photograph(
@@ -124,14 +124,30 @@ def find_chessboard(grey: ndarray, columns: int, rows: int) -> Float[ndarray, "m
     return sight.pixels if isinstance(sight, Sight) and len(sight.ids) == columns * rows else None
 
 
-def board_size(grey: ndarray) -> tuple[int, int] | None:
-    """The columns and rows of the board that is in a photograph, all four of its sides seen; else None."""
+def board_size(grey: ndarray, *, whole: bool = True) -> tuple[int, int] | None:
+    """The columns and rows of the board that is in a photograph, the larger first; None without one.
+
+    Args:
+        grey: (h,w) uint8.
+        whole: whether all four of its sides must be seen; else one will do.
+    """
     for found, copy, _ in _hanging_together(grey):
         grid = laid_out(copy, found, max(found.size))
-        if grid and all(grid.ends) and min(grid.seen.shape) > 2:
+        if grid and (all if whole else any)(grid.ends) and min(grid.seen.shape) > 2:
             rows, columns = sorted(grid.seen.shape)
             return columns, rows
     return None
+
+
+def lattice_sizes(grey: ndarray) -> set[tuple[int, int]]:
+    """The columns and rows of all lattices in a photograph that may be boards, the larger first.
+
+    Args:
+        grey: (h,w) uint8.
+    """
+    grids = (laid_out(copy, found, max(found.size)) for found, copy, _ in _hanging_together(grey))
+    sizes = (sorted(grid.seen.shape) for grid in grids if grid)
+    return {(columns, rows) for rows, columns in sizes if rows > 2}
 
 
 def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, list[CornerLattice]]]:

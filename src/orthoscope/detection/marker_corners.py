@@ -11,6 +11,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from orthoscope.detection.grid import cross
 from orthoscope.geometry.arrays import Bool, Float, ndarray
 
 __all__ = ["crossings_of_sides"]
@@ -36,7 +37,11 @@ FEWEST_STATIONS = 10
 # Places that are off their side's curve by more than this, pixels, and three times the usual, are left out.
 FARTHEST_OFF = 0.3
 # Curves are found so many times, each time from the corners of the time before.
-ROUNDS = 3
+ROUNDS = 2
+# Curves cross after so many of Newton's steps.
+NEWTON_STEPS = 4
+# And no farther from the end of their sides than this share of them.
+FARTHEST_CROSSING = 0.3
 
 
 def crossings_of_sides(
@@ -111,12 +116,15 @@ def _offsets(values: Float[ndarray, "4 s k"]) -> tuple[Float[ndarray, "4 s"], Bo
 
 def _curve(at: Float[ndarray, " s"], offset: Float[ndarray, " s"], degree: int) -> Float[ndarray, "3"]:
     """Coefficients, constant first, of a parabola or a line through offsets; those far from it left out."""
-    kept = np.ones(len(at), dtype=bool)
-    curve = np.zeros(3)
+    powers = np.vander(at, degree + 1, increasing=True)
+    kept, curve = np.ones(len(at), dtype=bool), np.zeros(3)
     for _ in range(2):
-        curve[: degree + 1] = np.polynomial.polynomial.polyfit(at[kept], offset[kept], degree)
-        off = np.abs(np.polynomial.polynomial.polyval(at, curve) - offset)
-        kept = off <= max(FARTHEST_OFF, 3.0 * float(np.median(off)))
+        curve[: degree + 1] = np.linalg.lstsq(powers[kept], offset[kept], rcond=None)[0]
+        off = np.abs(powers @ curve[: degree + 1] - offset)
+        still = off <= max(FARTHEST_OFF, 3.0 * float(np.median(off)))
+        if (still == kept).all():
+            break
+        kept = still
     return curve
 
 
@@ -127,28 +135,27 @@ def _crossed(
     curves: Float[ndarray, "4 3"],
 ) -> Float[ndarray, "4 2"] | None:
     """Where the end of each side before meets the begin of each side, by Newton's method."""
-    corners = np.empty((4, 2))
-    for side in range(4):
-        one, other = side - 1, side
-        s, t = 1.0, 0.0
-        for _ in range(10):
-            (p, dp), (q, dq) = (
-                _on_side(start[k], along[k], outward[k], curves[k], at) for k, at in ((one, s), (other, t))
-            )
-            jacobian = np.stack([dp, -dq], axis=1)
-            if abs(np.linalg.det(jacobian)) < 1e-9:
-                return None
-            step = np.linalg.solve(jacobian, q - p)
-            s, t = s + step[0], t + step[1]
-        if not (abs(s - 1.0) < 0.3 and abs(t) < 0.3):
+    before = [np.roll(part, 1, axis=0) for part in (start, along, outward, curves)]
+    s, t = np.ones(4), np.zeros(4)
+    for _ in range(NEWTON_STEPS):
+        (p, dp), (q, dq) = _on_sides(*before, s), _on_sides(start, along, outward, curves, t)
+        area = cross(dp, dq)
+        if (np.abs(area) < 1e-9).any():
             return None
-        corners[side] = p
-    return corners
+        s, t = s + cross(q - p, dq) / area, t + cross(q - p, dp) / area
+    if not (np.abs(s - 1.0) < FARTHEST_CROSSING).all() or not (np.abs(t) < FARTHEST_CROSSING).all():
+        return None
+    return _on_sides(start, along, outward, curves, t)[0]
 
 
-def _on_side(
-    start: ndarray, along: ndarray, outward: ndarray, curve: ndarray, at: float
-) -> tuple[Float[ndarray, "2"], Float[ndarray, "2"]]:
-    """A place on a side's curve, and how it moves along."""
-    place = start + at * along + outward * (curve[0] + at * (curve[1] + at * curve[2]))
-    return place, along + outward * (curve[1] + 2.0 * at * curve[2])
+def _on_sides(
+    start: Float[ndarray, "4 2"],
+    along: Float[ndarray, "4 2"],
+    outward: Float[ndarray, "4 2"],
+    curves: Float[ndarray, "4 3"],
+    at: Float[ndarray, "4"],
+) -> tuple[Float[ndarray, "4 2"], Float[ndarray, "4 2"]]:
+    """A place on the curve of each side, and how it moves along."""
+    constant, slope, bend = curves.T
+    away, turn = constant + at * (slope + at * bend), slope + 2.0 * at * bend
+    return start + at[:, None] * along + away[:, None] * outward, along + turn[:, None] * outward

@@ -19,11 +19,12 @@ from orthoscope.evaluation.evaluate import examine
 from orthoscope.evaluation.verdict.facts import situation_of
 from orthoscope.evaluation.verdict.grades import Grade, by_error
 from orthoscope.evaluation.verdict.situation import Situation, coarse_px
-from orthoscope.evaluation.verdict.verdict import HEADS, px
+from orthoscope.evaluation.verdict.verdict import HEADS
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.geometry.blas import with_one_thread
+from orthoscope.geometry.numbers import rough_pixels
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.models.camera import Camera
 from orthoscope.targets.detections import Detections
@@ -76,8 +77,8 @@ class CameraCheck:
         return by_error(Situation(error_px=self.apart_px, coarse_px=coarse_px(size)))
 
     def __str__(self) -> str:
-        head, apart = HEADS[self.grade], px(self.apart_px)
-        known = px(self.known_px)
+        head, apart = HEADS[self.grade], rough_pixels(self.apart_px)
+        known = rough_pixels(self.known_px)
         their_own = f"the camera that these photographs give by themselves, which they know to {known} px"
         if not self.changed:
             return f"{head}: {their_own}, is {apart} px away."
@@ -100,7 +101,8 @@ class CameraCheck:
             return (
                 "No change of focal length or principal point explains that: it is the lens, or its formula."
             )
-        return f"Most of that is one change: {' and '.join(changes)}; {px(self.unexplained_px)} px are left."
+        left = rough_pixels(self.unexplained_px)
+        return f"Most of that is one change: {' and '.join(changes)}; {left} px are left."
 
     def _advice(self) -> str:
         return "" if self.grade == Grade.GOOD else "Calibrate anew, with these photographs or better ones."

@@ -4,9 +4,10 @@ The *camera error* at a place is the distance in pixels between this camera's im
 true camera's, a turn of the camera fitted out (a turn and a shift for things at the target's distance).
 Nobody knows the true camera; what is predicted is the root mean square of that distance,
 
-    E^2 = max(alike, jackknife + prior) + bias^2,
+    E^2 = max(alike, views) + bias^2,    views = (n (jackknife + prior) + alike) / (n + 1),
 
-the larger of two variances (scatter.py: errors alike within a view; views left out), and for a camera that
+the larger of two variances (scatter.py: errors alike within a view; views left out), the second of which few
+views know so badly, as n independent draws, that the first counts for one more; and for a camera that
 follows a formula, or takes its target for flat, its squared difference to the richest model beyond what
 chance makes of it:
 
@@ -25,6 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.evaluation.verdict.situation import FINE_PX
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.scatter import Scatter
 from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
@@ -34,6 +36,8 @@ __all__ = ["CameraError", "picked", "predicted_error", "rms_difference", "seen_p
 
 # So many corners stand for all that were seen.
 PLACE_COUNT = 240
+# Beside the jackknife, what errors alike within views say of the variance counts as so many draws.
+ALIKE_DRAWS = 1.0
 # The map has so many columns.
 MAP_COLUMNS = 28
 # The map has so many rows.
@@ -42,10 +46,6 @@ MAP_ROWS = 21
 DIRECTION_COUNT = 48
 # The region is grown in so many steps.
 REGION_STEPS = 20
-# Where the error is more than so many times that over the seen part, the camera is not to be used.
-GENEROUS_RATIO = 2.0
-# No place is given up whose error is below this, pixels.
-NEGLIGIBLE_PX = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +63,8 @@ class CameraError:
         distance: of the target, metres, in the typical view.
         far, near: (rows, columns) over the frame, row by row, at the cells' centres; NaN where the camera has
             no image.
-        limit_px: where the error is larger the camera is not to be used.
-        region: (n,2) pixels, the polygon of the places where it may be.
+        limit_px: where the error is larger the camera is not called good; the limit of the grades.
+        region: (n,2) pixels, the polygon of the places where it is smaller and corners were seen around.
         without_px: (m,) of each photograph, by how much the image over the seen part moves without it; NaN
             where the others cannot tell.
     """
@@ -116,10 +116,16 @@ class _Variances:
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
         self.moved = (by_view**2).sum(1)  # (n, m)
         self.views = np.nansum(self.moved, axis=1) + _spread(slopes, scatter.prior)
+        draws = _effective_draws(np.nansum(self.moved[:fitted], axis=0))
+        self.views = (draws * self.views + ALIKE_DRAWS * self.alike) / (draws + ALIKE_DRAWS)
         self.bias = np.zeros(len(rays))
         if rich is not None:
+            of_rich = _settled(rich, rays, fitted, distance)
+            if not scatter.stretch.any():  # a target that is taken for flat hides a stretch as well
+                hidden = _spread(of_rich, rich.stretch)
+                self.alike, self.views = self.alike + hidden, self.views + hidden
             apart = difference_of_images(rich.camera, scatter.camera, rays, rays[:fitted], distance=distance)
-            both = by_view - _settled(rich, rays, fitted, distance) @ rich.left_out.T
+            both = by_view - of_rich @ rich.left_out.T
             by_chance = np.nansum(both**2, axis=(1, 2))
             self.apart, self.by_chance = np.nan_to_num((apart**2).sum(1)), by_chance
             self.bias = np.maximum(self.apart - by_chance, 0.0)
@@ -168,7 +174,6 @@ def predicted_error(
     far = _Variances(scatter, richest, places, len(seen), np.inf)
     near = _Variances(scatter, richest, lengths[:, None] * places, len(seen), typical)
     seen_px, model_px, alike_px, views_px, bias_px = far.over(part_seen)
-    limit = max(GENEROUS_RATIO * seen_px, NEGLIGIBLE_PX)
     along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(DIRECTION_COUNT, REGION_STEPS)
     return CameraError(
         seen_px=seen_px,
@@ -182,8 +187,8 @@ def predicted_error(
         distance=typical,
         far=np.sqrt(far.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
         near=np.sqrt(near.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
-        limit_px=limit,
-        region=_grown(middle, ways, along <= limit),
+        limit_px=FINE_PX,
+        region=_grown(middle, ways, (along <= FINE_PX) & _between(seen, ways)),
         without_px=np.sqrt(far.moved[part_seen].mean(0)),
     )
 
@@ -229,6 +234,15 @@ def _settled(
     return slopes - motion @ undone
 
 
+def _effective_draws(squares: Float[ndarray, " m"]) -> float:
+    """Of how many independent draws of one size a sum of squares is as sure (F. Satterthwaite, 1946).
+
+    Args:
+        squares: by each view left out; 0 where the others cannot tell.
+    """
+    return float(squares.sum() ** 2 / max((squares**2).sum(), 1e-300))
+
+
 def _spread(slopes: Float[ndarray, "n 2 d"], covariance: Float[ndarray, "d d"]) -> Float[ndarray, " n"]:
     """The variance of the image, both coordinates together."""
     return ((slopes @ covariance) * slopes).sum((1, 2))
@@ -260,6 +274,13 @@ def _grown(
     reached = np.where(good.all(1), REGION_STEPS, np.argmin(good, axis=1))
     edge = ways[np.arange(len(ways)), np.maximum(reached - 1, 0)]
     return np.where(reached[:, None] > 0, edge, middle)
+
+
+def _between(seen: Float[ndarray, "s 2"], ways: ndarray) -> Bool[ndarray, "directions steps"]:
+    """Whether places lie in the convex hull of the seen ones: no farther out than they in any direction."""
+    angle = 2.0 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
+    outwards = np.stack([np.cos(angle), np.sin(angle)])
+    return (ways @ outwards <= (seen @ outwards).max(0)).all(-1)
 
 
 def _inside(polygon: Float[ndarray, "n 2"], pixels: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:

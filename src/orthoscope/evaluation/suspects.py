@@ -17,6 +17,7 @@ from orthoscope.evaluation.coverage import place_of
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.scatter import patterns_over_views
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.numbers import rough_pixels
 from orthoscope.targets.detections import Detections
 
 __all__ = ["ViewError", "precious_among", "suspects_among"]
@@ -73,7 +74,9 @@ def suspects_among(
 
 
 def _wrong(error: float, typical: float, smooth: float) -> str:
-    figures = f"corners are off by {error:.2g} px, in a typical photograph by {typical:.2g}"
+    figures = (
+        f"corners are off by {rough_pixels(error)} px, in a typical photograph by {rough_pixels(typical)}"
+    )
     why = (
         "the target was bent another way"
         if smooth > SMOOTH_SHARE

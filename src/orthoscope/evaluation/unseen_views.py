@@ -24,7 +24,8 @@ from orthoscope.methods import METHODS
 
 __all__ = ["USUAL_FOLDS", "UnseenViews", "in_folds", "in_turn"]
 
-USUAL_FOLDS = 5  # of a method that leaves no view out by itself
+# A method that leaves no view out by itself is called again without each of so many parts.
+USUAL_FOLDS = 5
 
 
 class UnseenViews(NamedTuple):

@@ -221,11 +221,14 @@ def residuals_of(
     """Predicted minus detected, pixels, an array (n,2) for each view, for a camera and one pose for each
     view.
     """
-    points = points_of(detections.target, shape)
-    return tuple(
-        camera.project(pose.apply(points[view.ids]), beyond=True) - view.pixels
-        for pose, view in zip(camera_from_target, detections.views, strict=True)
+    points, views = points_of(detections.target, shape), detections.views
+    if not views:
+        return ()
+    placed = [pose.apply(points[view.ids]) for pose, view in zip(camera_from_target, views, strict=True)]
+    apart = camera.project(np.concatenate(placed), beyond=True) - np.concatenate(
+        [view.pixels for view in views]
     )
+    return tuple(np.split(apart, np.cumsum([len(each) for each in placed])[:-1]))
 
 
 def rms(residuals: Float[ndarray, "n 2"]) -> float:

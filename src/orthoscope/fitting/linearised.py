@@ -25,7 +25,7 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.models.camera import Camera
-from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
 
 __all__ = ["Linearised", "ResidualSlopes"]
 
@@ -218,13 +218,13 @@ class Linearised:
         if not self.by_corner:
             return self._covariance @ pulls
         n = self.unknowns - SPACE * len(self._inverse_blocks)
-        shared, corners = pulls[:n], pulls[n:].reshape(len(self._inverse_blocks), SPACE, -1)
-        scaled = self._inverse_blocks @ corners  # C^-1 b
-        right = -np.tensordot(self.normal.B, scaled, axes=([0, 2], [0, 1]))
-        right[:n] += shared
+        columns, blocks = pulls.shape[1], (len(self._inverse_blocks), SPACE, -1)
+        scaled = self._inverse_blocks @ pulls[n:].reshape(blocks)  # C^-1 b
+        right = -(self._crossed @ scaled.reshape(-1, columns))
+        right[:n] += pulls[:n]
         found = self._covariance @ right
-        of_corners = scaled - self._inverse_blocks @ (self.normal.B.transpose(0, 2, 1) @ found)
-        return np.concatenate([found[:n], of_corners.reshape(-1, pulls.shape[1])])
+        of_corners = scaled - self._inverse_blocks @ (self._crossed.T @ found).reshape(blocks)
+        return np.concatenate([found[:n], of_corners.reshape(-1, columns)])
 
     @cached_property
     def camera_columns(self) -> Float[ndarray, "q d"]:
@@ -280,12 +280,15 @@ class Linearised:
         return np.linalg.inv(self.normal.C)
 
     @cached_property
+    def _crossed(self) -> Float[ndarray, "s b"]:
+        """The sums of the shared unknowns with those that were eliminated."""
+        B = self.normal.B
+        return B.transpose(1, 0, 2).reshape(B.shape[1], -1)
+
+    @cached_property
     def _covariance(self) -> Float[ndarray, "s s"]:
         """The inverse of the shared system, the blocks eliminated; over sigma^2."""
-        B, m = self.normal.B, len(self.normal.B)
-        stacked = B.transpose(1, 0, 2).reshape(B.shape[1], -1)
-        other = (B @ self._inverse_blocks).transpose(1, 0, 2).reshape(B.shape[1], -1) if m else stacked
-        return _inverse(self.normal.A - other @ stacked.T)
+        return _inverse(eliminated(self.normal, inverse_roots(self.normal.C)))
 
 
 def _orthonormal(columns: Float[ndarray, "m n 6"]) -> Float[ndarray, "m n 6"]:

@@ -1,6 +1,6 @@
 """How a camera scatters: what its own fit says of it, and what leaving views out says.
 
-Four covariances of a camera's unknowns (its named parameters, then its displacement's coefficients), all of
+Covariances of a camera's unknowns (its named parameters, then its displacement's coefficients), all of
 them by one linear step:
 
 model      independent errors of corners, and the priors' own scatter: noise H^-1
@@ -8,6 +8,9 @@ prior      the second of these alone: noise H^-1 L H^-1
 alike      `model`, with errors that are alike within a view: smooth patterns of order 2, 3 and 4 over the
            board count tau_o times, as often as they are larger in the residuals than independent errors make
            them
+stretch    what a stretch and a shear of the board by STRETCH_SHARE would do where no view shows them:
+           boards that all stand upright leave the pixels' aspect to the board's, and of that the prior of
+           its shape, found from finer patterns, says what it cannot know; it is in `prior` and in `alike`
 jackknife  from how the camera moves when each view is left out (leave_one_out.py); it sees what lives in the
            camera itself, such as a focal length that breathes, and boards that bend from view to view
 
@@ -30,7 +33,7 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import polynomials
 
-__all__ = ["ORDERS", "Scatter", "likenesses", "patterns_over_views", "scatter_of"]
+__all__ = ["ORDERS", "STRETCH_SHARE", "Scatter", "likenesses", "patterns_over_views", "scatter_of"]
 
 # Patterns over a board have these orders: a pose takes those below, and of those above errors are as good as
 # independent.
@@ -44,6 +47,8 @@ VIEW_COUNT = 40
 # What is left of a pattern after pose and patterns before it is rounding when it is no more than this share
 # of its length.
 THIN_SHARE = 1e-6
+# No print is known to be truer along one side than along the other, or at right angles, than this share.
+STRETCH_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +59,7 @@ class Scatter:
         camera: where its fit ended.
         names: of its k parameters that moved; the displacement's coefficients, along x and then along y, come
             after them.
-        model, alike, prior: (d,d) covariances.
+        model, alike, prior, stretch: (d,d) covariances.
         left_out: (m,d) rows whose products sum to the jackknife's covariance; NaN for views that the others
             cannot tell.
     """
@@ -65,6 +70,7 @@ class Scatter:
     alike: Float[ndarray, "d d"]
     prior: Float[ndarray, "d d"]
     left_out: Float[ndarray, "m d"]
+    stretch: Float[ndarray, "d d"]
 
     @cached_property
     def jackknife(self) -> Float[ndarray, "d d"]:
@@ -97,10 +103,41 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
         if larger > 1.0:
             by_camera = fit.camera_columns.T @ some.pulls(rows).transpose(1, 0, 2).reshape(fit.unknowns, -1)
             camera += (larger - 1.0) * by_camera @ by_camera.T
-    alike = fit.camera_covariance + fit.noise * fit.views / some.views * camera
-    return Scatter(
-        fit.camera, fit.names, fit.camera_covariance, alike, fit.prior_covariance, left_out.scatter
-    )
+    stretch = _by_stretch(fit, points)
+    alike = fit.camera_covariance + fit.noise * fit.views / some.views * camera + stretch
+    prior = fit.prior_covariance + stretch
+    return Scatter(fit.camera, fit.names, fit.camera_covariance, alike, prior, left_out.scatter, stretch)
+
+
+def _by_stretch(fit: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray, "d d"]:
+    """What is added to the camera's covariance where the shape's prior is no surer of stretch and shear than
+    STRETCH_SHARE; nothing where views show them, or where the prior is no surer.
+
+    With w'x how much of a mode is in the unknowns, and H less `excess` w w': the Woodbury identity.
+    """
+    surface = fit.slopes.surface
+    r = surface.shape[1]
+    if not r or fit.noise <= 0.0:
+        return np.zeros((fit.of_camera, fit.of_camera))
+    seen = np.any(surface != 0.0, axis=1)
+    (x, y), zero = ((points[:, :2] - points[seen, :2].mean(0)) * seen[:, None]).T, np.zeros(len(points))
+    precision, ways, excess = fit.shape_precision[: 3 * r], [], []
+    for mode in (np.stack([x, -y, zero]), np.stack([y, x, zero])):
+        unit = np.linalg.lstsq(surface, 0.5 * mode.T, rcond=None)[0].ravel()
+        known = float(unit @ (precision * unit))  # of the mode, by the prior
+        more = known - fit.noise / STRETCH_SHARE**2
+        if more > 0.0:
+            way = np.zeros(fit.unknowns)
+            way[fit.of_camera : fit.of_camera + 3 * r] = precision * unit / known
+            ways.append(way)
+            excess.append(more)
+    if not ways:
+        return np.zeros((fit.of_camera, fit.of_camera))
+    W = np.stack(ways, axis=1)
+    solved = fit.solved(W)
+    left = np.diag(1.0 / np.array(excess)) - W.T @ solved
+    camera = solved[: fit.of_camera]
+    return fit.noise * camera @ np.linalg.solve(left, camera.T)
 
 
 def patterns_over_views(

@@ -109,6 +109,12 @@ def _table(text: str, path: str | Path) -> _Table:
         )
     table = _Table([], np.empty((0, 2)), text)
     columns = dict(zip(legend, _columns(table, len(legend), path), strict=False))
+    beyond = [name for name in ("filename", "x", "y") if name not in columns]
+    if beyond:
+        raise InputError(
+            f"{path}, line {table.line(0)}, has {len(columns)} columns; expected {len(legend)} with"
+            f" {beyond[0]!r} among them, as the legend says. Mend the legend or the lines."
+        )
     numbers = {name: _numbers(columns[name], table, path) for name in ("x", "y", *PRESENT) if name in columns}
     pixels = np.stack([numbers["x"], numbers["y"]], axis=1)
     pixels[~(pixels >= 0).all(axis=1)] = np.nan

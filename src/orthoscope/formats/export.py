@@ -31,6 +31,8 @@ __all__ = ["LIMIT_PX", "Exportable", "Exported", "export", "exportable"]
 
 # A formula that is farther than this from the camera, on average, is another camera.
 LIMIT_PX = 1.0
+# Corners that are as good as all of them to fit a formula to.
+ENOUGH_CORNERS = 4000
 
 
 class Exportable(NamedTuple):
@@ -190,8 +192,9 @@ def _nearest(camera: Camera, rays: Float[ndarray, "n 3"], record: Format) -> tup
 
 
 def _corners(calibration: Calibration) -> Float[ndarray, "n 2"]:
-    """The pixels of all corners that the camera was made from."""
-    return np.concatenate([view.pixels for view in calibration.detections.views])
+    """The pixels of corners that the camera was made from, evenly picked where they are many."""
+    pixels = np.concatenate([view.pixels for view in calibration.detections.views])
+    return pixels[:: max(1, len(pixels) // ENOUGH_CORNERS)]
 
 
 def _poses(source: Calibration | Camera | Scene | Contents) -> Mapping[str, Pose]:

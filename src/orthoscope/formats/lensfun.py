@@ -34,6 +34,8 @@ __all__ = ["LENSFUN"]
 FRAME_MM = (36.0, 24.0)
 # Lenses of one database that are looked at; the shipped ones have some hundreds.
 MOST_LENSES = 10_000
+# No frame is so many times longer than wide.
+MOST_OBLONG = 100.0
 
 
 def _recognises(document: Document) -> bool:
@@ -112,7 +114,7 @@ def _unit(lens: Element, size: tuple[int, int], document: Document) -> float:
     """The unit of the radius, pixels."""
     words = (lens.findtext("aspect-ratio") or "3:2").split(":")
     across, down = (number(word, "aspect-ratio", document) for word in (*words, "1")[:2])
-    if not (across > 0 and down > 0):
+    if not (across > 0 and down > 0 and 1.0 / MOST_OBLONG < across / down < MOST_OBLONG):
         raise document.refuse(f"has an aspect ratio of {':'.join(words)[:40]!r}; expected one such as 3:2")
     return 0.5 * math.hypot(*_sides(size)) / math.hypot(across / down, 1.0)
 

@@ -11,9 +11,11 @@ import numpy as np
 __all__ = [
     "ABSENT",
     "degrees",
+    "fixed",
     "percent",
     "pixels",
     "probability",
+    "rough_pixels",
     "setting",
     "six_digits",
     "value_with_deviation",
@@ -34,6 +36,18 @@ def pixels(value: float) -> str:
         if abs(value) < 1000
         else f"{value:.0f}"
     )
+
+
+def rough_pixels(value: float) -> str:
+    """An error in pixels as a sentence says it: two digits, none of them below a hundredth of a pixel."""
+    if value >= 10.0:
+        return f"{value:.0f}"
+    return f"{value:.2g}" if value >= 0.095 else f"{max(value, 0.01):.2f}"
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number in a column of numbers with so many decimals."""
+    return f"{value:.{decimals}f}" if math.isfinite(value) else ABSENT
 
 
 def percent(share: float) -> str:

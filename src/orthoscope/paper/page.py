@@ -8,13 +8,13 @@ knows how an experiment ends. The same results give the same bytes; times alone 
 from __future__ import annotations
 
 import re
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from orthoscope.geometry.numbers import ABSENT
+from orthoscope.geometry.numbers import ABSENT, fixed, with_error
 from orthoscope.methods import METHODS
 from orthoscope.paper.claims import Claim, ClaimVerdict, main_headline, of_sentence
 from orthoscope.paper.curves import curves_of
@@ -236,8 +236,8 @@ def _centres(results: Results) -> list[tuple[str, str, int, str, str]]:
     return [(c.scene, c.name, c.trials, _with_spread(c.x), _with_spread(c.y)) for c in centres(results)]
 
 
-def _with_spread(pair: tuple[float, float]) -> str:
-    return " ± ".join(_number(value, 2) for value in pair)
+def _with_spread(pair: tuple[float, float], decimals: int = 2) -> str:
+    return with_error(*pair, alone=partial(fixed, decimals=decimals))
 
 
 def _tone(verdict: ClaimVerdict) -> str:
@@ -270,7 +270,7 @@ def _members(results: Results) -> list[tuple[str, list[list[str]]]]:
                 [
                     (f"eq. (7), {m.name}" if m.literal else m.name),
                     f"{m.J:.0e}" if m.literal else ABSENT,
-                    *(_number(value, 1) for value in m.judgement[2:6]),
+                    *(fixed(value, 1) for value in m.judgement[2:6]),
                     _nce(m.judgement.test_nce),
                 ]
                 for m in results.members
@@ -319,17 +319,13 @@ def _parameters(table: list[ParameterColumn]) -> list[tuple[str, list[str]]]:
         rows.append(
             (
                 label,
-                [" ± ".join(_number(value, decimals) for value in column.values[key]) for column in table],
+                [_with_spread(column.values[key], decimals) for column in table],
             )
         )
     rows.append(("Training error (NCE)", [_nce(column.training_nce) for column in table]))
     rows.append(("Testing error (NCE)", [_nce(column.test_nce) for column in table]))
     rows.append(("Splits without a camera", [str(column.failures) for column in table]))
     return rows
-
-
-def _number(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if np.isfinite(value) else ABSENT
 
 
 def _nce(value: float) -> str:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from orthoscope.evaluation.comparison.compare import Comparison, Standing
 from orthoscope.evaluation.comparison.conclusions import as_good_as_best, conclusions
-from orthoscope.geometry.numbers import ABSENT, pixels, with_error
+from orthoscope.geometry.numbers import ABSENT, fixed, pixels, with_error
 from orthoscope.report.html import Content, Html, table, tag
 from orthoscope.report.page import closed_page
 from orthoscope.report.sections import figure
@@ -165,6 +165,7 @@ def _entries(comparison: Comparison) -> list[dict[str, Any]]:
             "name": each.entry.name,
             "heldOut": _plain(each.held_out_px),
             "error": _plain(each.error_px),
+            "told": f"{with_error(each.held_out_px, each.error_px)} px",
             "used": _plain(each.rms_px),
             "loses": _plain(each.loses_px),
             "failure": (
@@ -209,15 +210,11 @@ def _row(standing: Standing, verdict: str) -> Row:
         loses=(
             with_error(standing.loses_px, standing.loses_error_px) if judged and verdict != "best" else ABSENT
         ),
-        nce=_number(standing.nce, ".3f"),
+        nce=fixed(standing.nce, 3),
         used=pixels(standing.rms_px),
-        parameters=_number(standing.parameters, ".0f"),
-        seconds=_number(standing.seconds, ".2f"),
+        parameters=fixed(standing.parameters, 0),
+        seconds=fixed(standing.seconds, 2),
         lens=standing.lens or ABSENT,
         shape=standing.shape or ABSENT,
         failure=standing.failure,
     )
-
-
-def _number(value: float, form: str) -> str:
-    return format(value, form) if value == value else ABSENT

@@ -19,7 +19,9 @@ from orthoscope.geometry.numbers import (
     pixels,
     probability,
     setting,
+    six_digits,
     value_with_deviation,
+    with_error,
 )
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
@@ -176,12 +178,11 @@ def parameters(calibration: Calibration) -> list[Parameter]:
 
 def camera_line(calibration: Calibration) -> str:
     """Focal lengths and principal point with their standard deviations, one line."""
-    values = {row.name: row for row in parameters(calibration) if row.name in ("fx", "fy", "cx", "cy")}
-    told = (
-        f"{name} {row.value}" + ("" if row.deviation in (ABSENT, "fixed") else f" ± {row.deviation}")
-        for name, row in values.items()
+    K, deviations = calibration.camera.intrinsics, calibration.uncertainty.deviations
+    return " · ".join(
+        f"{name} {with_error(getattr(K, name), deviations.get(name, np.nan), alone=six_digits)}"
+        for name in ("fx", "fy", "cx", "cy")
     )
-    return " · ".join(told)
 
 
 def lens_rows(calibration: Calibration) -> list[tuple[str, str]]:

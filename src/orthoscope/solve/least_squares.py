@@ -24,7 +24,17 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.solve.losses import Linear, Loss
 
-__all__ = ["NormalEquations", "Options", "Problem", "Solution", "Status", "shared_covariance", "solve"]
+__all__ = [
+    "NormalEquations",
+    "Options",
+    "Problem",
+    "Solution",
+    "Status",
+    "eliminated",
+    "inverse_roots",
+    "shared_covariance",
+    "solve",
+]
 
 Unknowns = TypeVar("Unknowns")
 
@@ -205,10 +215,9 @@ def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray
     """
     unknowns = sums.a.size + sums.c.size
     variance = sums.cost / max(measurements - unknowns, 1)
-    eliminated, _ = _eliminate(sums, sums.A, _inverse(sums.C))
     # Conditioning is judged between unknowns of like size.
     scale = np.sqrt(_weights(sums.A, "diagonal"))
-    values, vectors = np.linalg.eigh(eliminated / np.outer(scale, scale))
+    values, vectors = np.linalg.eigh(eliminated(sums, _open_roots(sums.C)) / np.outer(scale, scale))
     covariance = (
         variance
         * (vectors / np.maximum(values, LARGEST_OPEN_EIGENVALUE))
@@ -289,9 +298,12 @@ def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndar
     """Shared step, view steps and what the quadratic model promises to take off the cost; NaN for no step."""
     of_shared, of_views = damping * _weights(sums.A, damp), damping * _weights(sums.C, damp)
     try:
-        inverse = np.linalg.inv(sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2]))
-        eliminated, right = _eliminate(sums, sums.A + np.diag(of_shared), inverse)
-        shared = -np.linalg.solve(eliminated, right)
+        roots = inverse_roots(sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2]))
+        inverse = roots @ roots.transpose(0, 2, 1)
+        by_views = (inverse @ sums.c[:, :, None])[:, :, 0]
+        system = eliminated(sums, roots)
+        system[np.diag_indices_from(system)] += of_shared
+        shared = -np.linalg.solve(system, sums.a - np.einsum("mkp,mp->k", sums.B, by_views))
     except np.linalg.LinAlgError:  # singular as far as numbers go
         return np.zeros_like(sums.a), np.zeros_like(sums.c), float("nan")
     views = -(inverse @ (sums.c + shared @ sums.B)[:, :, None])[:, :, 0]
@@ -299,26 +311,33 @@ def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndar
     return shared, views, float(-(sums.a @ shared) - (sums.c * views).sum() + damped)
 
 
-def _eliminate(sums: NormalEquations, A: ndarray, inverse: ndarray) -> tuple[ndarray, ndarray]:
-    """The shared system and its right side after the views are eliminated.
+def eliminated(sums: NormalEquations, roots: Float[ndarray, "m p p"]) -> Float[ndarray, "k k"]:
+    """The shared system after the views are eliminated: a matrix times its own transpose, half the work of
+    a product.
 
     Args:
-        sums: of which B, a and c are used.
-        A: the shared block, which may be damped.
-        inverse: C^-1 of each view, (m,p,p), C perhaps damped.
+        sums: of which A and B are used.
+        roots: G of each view, C^-1 = G G'.
     """
     m, k, p = sums.B.shape
-    B = sums.B.transpose(1, 0, 2).reshape(k, m * p)
-    Y = (sums.B @ inverse).transpose(1, 0, 2).reshape(k, m * p)
-    return A - Y @ B.T, sums.a - Y @ sums.c.reshape(-1)
+    W = (sums.B @ roots).transpose(1, 0, 2).reshape(k, m * p)
+    return sums.A - W @ W.T
 
 
-def _inverse(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:
-    """The inverse of each block; where nothing was measured, of what rounding would have measured there."""
+def inverse_roots(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:
+    """G of each block, C^-1 = G G'.
+
+    Raises:
+        LinAlgError: a block is not positive, as far as numbers go.
+    """
+    return np.linalg.inv(np.linalg.cholesky(C)).transpose(0, 2, 1)
+
+
+def _open_roots(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:
+    """G of each block, C^-1 = G G'; where nothing was measured, of what rounding would measure there."""
     scale = np.sqrt(_weights(C, "diagonal"))
     values, vectors = np.linalg.eigh(C / (scale[:, :, None] * scale[:, None, :]))
-    vectors = vectors / scale[:, :, None]
-    return (vectors / np.maximum(values, LARGEST_OPEN_EIGENVALUE)[:, None]) @ vectors.transpose(0, 2, 1)
+    return vectors / scale[:, :, None] / np.sqrt(np.maximum(values, LARGEST_OPEN_EIGENVALUE))[:, None]
 
 
 def _weights(block: ndarray, damp: str) -> ndarray:

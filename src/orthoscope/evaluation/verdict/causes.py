@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
+from orthoscope.geometry.numbers import rough_pixels
 
 __all__ = ["CAUSES", "FEW_VIEWS", "Cause", "listed"]
 
@@ -85,8 +86,8 @@ KINDS = {
         " focus)"
     ),
     "centre": lambda s: (
-        f"{APART}: the image moves on the sensor by about {s.differ_centre_px:.2g} px (a stabiliser or"
-        " cropping)"
+        f"{APART}: the image moves on the sensor by about {rough_pixels(s.differ_centre_px)} px"
+        " (a stabiliser or cropping)"
     ),
     # It is one camera all the same.
     "shutter": lambda s: (
@@ -145,7 +146,7 @@ CAUSES: tuple[Cause, ...] = (
         _as_far_as_it_goes,
         lambda s: (
             f"{_formula(s)} cannot follow this lens: at the same places of every photograph"
-            f" corners are off by {s.lens_px:.2g} px"
+            f" corners are off by {rough_pixels(s.lens_px)} px"
         ),
     ),
     Cause(

@@ -15,7 +15,6 @@ from orthoscope.evaluation.reference_fit import ReferenceFit
 from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
 from orthoscope.evaluation.verdict.situation import FINE_PX, USUAL_WIDTH, Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.geometry.arrays import ndarray
 from orthoscope.solve.least_squares import Status
 from orthoscope.targets.detections import Detections
 
@@ -23,6 +22,8 @@ __all__ = ["Findings", "corners_beyond", "distinct_views", "share_within", "situ
 
 # Views whose corners are apart by less (median, pixels in an image of 1000) are the same photograph again.
 COPIED_PX = 1.0
+# So many corners show that most pairs of photographs differ.
+SAMPLE_CORNERS = 16
 # With no more than this share of the views left without copies, that they agree says nothing.
 DISTINCT_SHARE = 0.7
 # A residual of more than this many times the median is farther off than heavy tails reach.
@@ -106,12 +107,19 @@ def distinct_views(detections: Detections) -> int:
     tables = np.full((len(detections.views), len(detections.target.points), 2), np.nan)
     for table, view in zip(tables, detections.views, strict=True):
         table[view.ids] = view.pixels
-    kept: list[ndarray] = []
+    kept = np.empty_like(tables)
+    some = np.unique(np.linspace(0, tables.shape[1] - 1, SAMPLE_CORNERS).round().astype(int))
+    count = 0
     for table in tables:
-        apart = [np.hypot(*(table - other).T) for other in kept]
-        if not any(np.isfinite(gap).sum() >= 4 and np.nanmedian(gap) < near for gap in apart):
-            kept.append(table)
-    return len(kept)
+        # Where none of a few corners is near, half of all are not.
+        sampled = np.hypot(*np.moveaxis(kept[:count, some] - table[some], -1, 0))
+        likely = np.flatnonzero((sampled < near).any(1) | np.isnan(sampled).all(1))
+        gaps = np.hypot(*np.moveaxis(kept[likely] - table, -1, 0))
+        gaps = gaps[np.isfinite(gaps).sum(1) >= 4]
+        if not len(gaps) or not (np.nanmedian(gaps, axis=1) < near).any():
+            kept[count] = table
+            count += 1
+    return count
 
 
 def share_within(reference: ReferenceFit | None, larger: float = 1.0, limit: float = FINE_PX) -> float:

@@ -9,6 +9,7 @@ from orthoscope.evaluation.verdict.advice import Advice, advice_on
 from orthoscope.evaluation.verdict.causes import CAUSES
 from orthoscope.evaluation.verdict.grades import Grade, by_error, lower
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation, coarse_px
+from orthoscope.geometry.numbers import rough_pixels
 
 __all__ = ["Verdict", "far_on_others", "verdict_on"]
 
@@ -68,32 +69,19 @@ def far_on_others(rms_px: float, image_size: tuple[int, int]) -> str:
         image_size: of the camera.
     """
     grade = by_error(Situation(error_px=rms_px, coarse_px=coarse_px(image_size)))
-    return f"{HEADS[grade]}: off by about {px(rms_px)} px where these photographs have corners."
+    return f"{HEADS[grade]}: off by about {rough_pixels(rms_px)} px where these photographs have corners."
 
 
 def _far(grade: Grade, s: Situation) -> str:
     if isnan(s.error_px):
         return f"{HEADS[grade]}: nothing says how far off it is."
     if grade in (Grade.GOOD, Grade.REGION):
-        seen = f"off by about {px(s.error_px)} px where corners were seen"
+        seen = f"off by about {rough_pixels(s.error_px)} px where corners were seen"
         return f"{HEADS[grade]}: {seen}, and by less than {FINE_PX:g} px over {_share(s.held)} of the frame."
     if s.near_px <= NEARER_SHARE * s.error_px:
-        near = f"off by about {px(s.near_px)} px at the distances where the target was"
-        return f"{HEADS[grade]}: {near}, by {px(s.error_px)} px far away."
-    return f"{HEADS[grade]}: off by about {px(s.error_px)} px where corners were seen."
-
-
-def px(value: float) -> str:
-    """Pixels to two digits that mean something."""
-    return (
-        f"{value:.0f}"
-        if value >= 10.0
-        else f"{value:.2g}"
-        if value >= 0.095
-        else f"{value:.2f}"
-        if value >= 0.01
-        else "0.01"
-    )
+        near = f"off by about {rough_pixels(s.near_px)} px at the distances where the target was"
+        return f"{HEADS[grade]}: {near}, by {rough_pixels(s.error_px)} px far away."
+    return f"{HEADS[grade]}: off by about {rough_pixels(s.error_px)} px where corners were seen."
 
 
 def _share(share: float) -> str:

@@ -10,7 +10,6 @@ no photograph is foreseen by so few others that another choice would have been r
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,50 +18,16 @@ from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.scatter import Scatter, scatter_of
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.methods.decoupled.fitters import Fitter, Kept
+from orthoscope.methods.decoupled.model import JOINT, PAIRS, Model
 from orthoscope.methods.decoupled.model_selection import NEGLIGIBLE_SQUARE, Contender
-from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.decoupled.step_two import formula_from_pairs
 from orthoscope.methods.decoupled.step_two_linearised import PairsLeftOut
-from orthoscope.methods.fccm import fit_flat
 from orthoscope.models.camera import Camera
-from orthoscope.models.lenses import FREE
 from orthoscope.targets.detections import Detections
 
 __all__ = ["JOINT", "PAIRS", "Candidates", "Model"]
-
-JOINT, PAIRS = "joint", "pairs"
-
-
-class Model(NamedTuple):
-    """One way to explain the photographs.
-
-    Attributes:
-        base: a formula.
-        shape: the kind of the target's.
-        first_lens: `free` or `formula`, the lens of step 1.
-        formula: fitted to the pairs of step 1; None where step 1's camera is taken as it is.
-    """
-
-    base: str
-    shape: str
-    first_lens: str
-    formula: str | None = None
-
-    @property
-    def lens(self) -> str:
-        """What the camera's lens is called."""
-        return self.formula or (FREE if self.first_lens == FREE else self.base)
-
-    @property
-    def fit(self) -> str:
-        """How the lens was fitted."""
-        return PAIRS if self.formula else JOINT
-
-    @property
-    def step_one(self) -> Model:
-        """The model whose fit of step 1 this one rests on."""
-        return self._replace(formula=None)
 
 
 class Candidates:
@@ -71,11 +36,13 @@ class Candidates:
     Args:
         detections: views that belong.
         skew: whether K has one.
+        fitter: how they are fitted; each from nothing and to the last digit by default.
     """
 
-    def __init__(self, detections: Detections, *, skew: bool) -> None:
+    def __init__(self, detections: Detections, *, skew: bool, fitter: Fitter | None = None) -> None:
         self.detections, self._skew = detections, skew
-        self.flat, self.step_one = cache(self._flat), cache(self._step_one)
+        self._fitter = fitter or Kept(detections, skew=skew)
+        self.flat, self.step_one = cache(self._fitter.flat), cache(self._fitter.step_one)
         self.linearised, self.left_out = cache(self._linearised), cache(self._left_out)
         self.from_pairs, self.scatter = cache(self._from_pairs), cache(self._scatter)
 
@@ -118,12 +85,6 @@ class Candidates:
             if model.formula
             else (fit.estimate.camera, fit.problem.free)
         )
-
-    def _flat(self, base: str) -> Calibration:
-        return fit_flat(self.detections, lens=base, skew=self._skew)
-
-    def _step_one(self, model: Model) -> StepOneFit:
-        return fit_step_one(self.flat(model.base), shape=model.shape, first_lens=model.first_lens)
 
     def _linearised(self, model: Model) -> Linearised:
         return linearised(self.step_one(model))

@@ -21,12 +21,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.fitting.board_order import in_one_order
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
 from orthoscope.fitting.held_out import FEWEST_VIEWS
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.blas import with_one_thread
-from orthoscope.methods.decoupled.candidates import JOINT, PAIRS, Candidates, Model
+from orthoscope.methods.decoupled.candidates import Candidates
+from orthoscope.methods.decoupled.fitters import Compared, Kept, some_of
+from orthoscope.methods.decoupled.model import JOINT, PAIRS, Model
 from orthoscope.methods.decoupled.model_selection import (
     Contender,
     first_as_good,
@@ -36,7 +39,7 @@ from orthoscope.methods.decoupled.model_selection import (
 )
 from orthoscope.methods.decoupled.step_one import FORMULA
 from orthoscope.methods.decoupled.step_two import by_simplicity
-from orthoscope.methods.fccm import fccm
+from orthoscope.methods.fccm import fit_flat
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.lenses import FREE, parse_lens
 from orthoscope.models.target_shape import SHAPES
@@ -99,14 +102,20 @@ def decoupled(
         InputError: a setting is none.
     """
     left = _open(lens, shape, base, first_lens, fit, formulas)
-    used = fccm(without_outliers(detections, lens=base), lens=base, skew=skew).detections
-    candidates = Candidates(used, skew=skew)
+    start = fit_flat(without_outliers(detections, lens=base), lens=base, skew=skew)
+    ordered = in_one_order(start)
+    used = ordered.detections
+    # Only what was fitted to these very lists is what another call would fit.
+    flats = {start.settings["lens"]: start} if ordered is start else {}
+    fitter = Compared(some_of(used), skew=skew, flats=flats)
+    candidates = Candidates(some_of(used), skew=skew, fitter=fitter)
     assumptions: tuple[str, ...] = ()
     if len(used.views) < FEWEST_VIEWS:
-        model, told = _assumed(left, used, skew), ()
+        model, told = _assumed(left, start), ()
         assumptions = (TOO_FEW,) if max(map(len, left)) > 1 else ()
     else:
         model, told = _chosen(candidates, left, judging)
+    candidates = Candidates(used, skew=skew, fitter=Kept(used, skew=skew, flats=flats, cold=fitter.cold))
     flat = candidates.flat(model.base)
     settings = {
         "lens": model.lens,
@@ -155,12 +164,12 @@ def _open(lens: str, shape: str, base: str, first_lens: str, fit: str, formulas:
     )
 
 
-def _assumed(left: _Open, used: Detections, skew: bool) -> Model:
+def _assumed(left: _Open, start: Calibration) -> Model:
     """The model for views that are too few to judge by: the simplest that the settings allow."""
     shape, first_lens, formula = left.shapes[0], left.first_lens[0], next(iter(left.formulas), None)
     if formula and JOINT in left.fits and first_lens == FORMULA:
         return Model(formula, shape, FORMULA)
-    base = left.bases[0] if len(left.bases) == 1 else fccm(used, skew=skew).settings["lens"]
+    base = left.bases[0] if len(left.bases) == 1 else start.settings["lens"]
     return Model(base, shape, first_lens, formula)
 
 

@@ -33,6 +33,8 @@ __all__ = ["Evidence", "first_guess"]
 # A printed corner's standard deviation starts from this share of the target's size; for a lens, from its
 # image, a pixel's tenth.
 GUESS_SHARE = 1e-3
+# Below this share of it a variance that is taken over would need many rounds to grow.
+AWAKE_SHARE = 0.03
 # A standard deviation is at least this share of the target's size.
 LEAST_SHARE = 1e-6
 # A standard deviation is at most this share of the target's size.
@@ -76,6 +78,18 @@ class Evidence:
     def of(cls, variances: Variances) -> Evidence:
         """As a calibration kept it."""
         return cls(*variances)
+
+    def with_shape_of(self, other: Evidence) -> Evidence:
+        """With the variances of the target's shape that another fit found, but none so small that it could
+        not grow.
+        """
+        least = (AWAKE_SHARE * GUESS_SHARE * self.size) ** 2
+        surface, singles = np.maximum(other.surface, least), np.maximum(other.singles, least)
+        return replace(
+            self,
+            surface=(float(surface[0]), float(surface[1])),
+            singles=(float(singles[0]), float(singles[1]), float(singles[2])),
+        )
 
     def precisions(self, coefficients: int) -> Precisions:
         """What a problem with so many coefficients of the surface is to know."""

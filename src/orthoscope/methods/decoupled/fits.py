@@ -11,15 +11,18 @@ from orthoscope.fitting.fits import Fits, OwnFit, RichestFit
 from orthoscope.fitting.leave_one_out import leave_one_out
 from orthoscope.fitting.scatter import scatter_of
 from orthoscope.geometry.arrays import CalibrationError
-from orthoscope.methods.decoupled.candidates import PAIRS, Candidates, Model
+from orthoscope.methods.decoupled.candidates import Candidates
+from orthoscope.methods.decoupled.model import PAIRS, Model
 from orthoscope.methods.decoupled.step_one_linearised import linearised_flat
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import FREE, lens_name
 
 __all__ = ["fits_of"]
 
-BASES_OF_RICHEST = ("brown", "kannala_brandt", "rational")  # that a free lens may have
-FEWEST_VIEWS = 2  # with fewer, a free lens and a free target have nothing to be told by
+# The richest fit has one of these bases under its free lens.
+RICHEST_BASES = ("brown", "kannala_brandt", "rational")
+# With fewer views a free lens and a free target have nothing to be told by.
+FEWEST_VIEWS = 2
 
 
 def fits_of(calibration: Calibration) -> Fits:
@@ -81,4 +84,4 @@ def _base(calibration: Calibration) -> str:
         return str(base)
     lens = calibration.camera.lens
     name = lens_name(lens.base if isinstance(lens, FreeLens) else lens)
-    return name if name in BASES_OF_RICHEST else "brown"
+    return name if name in RICHEST_BASES else "brown"

@@ -29,7 +29,7 @@ from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.parameters import Parameters
 from orthoscope.models.spline import Displacement
 from orthoscope.models.target_shape import WHOLE
-from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
 from orthoscope.solve.losses import Loss
 
 __all__ = ["DecoupledEstimate", "Joint", "Known", "Precisions"]
@@ -155,10 +155,8 @@ class Joint:
 
     def known(self, sums: NormalEquations) -> Known:
         """What the data determined, from the sums where a solve ended."""
-        inverse = np.linalg.inv(sums.C)
-        Y = sums.B @ inverse
-        eliminated = sums.A - np.tensordot(Y, sums.B, axes=([0, 2], [0, 2]))
-        covariance = _inverse(eliminated)
+        roots = inverse_roots(sums.C)
+        inverse, covariance = roots @ roots.transpose(0, 2, 1), _inverse(eliminated(sums, roots))
         k, g, n = len(self.free), len(self.energy), self._n
         spread = np.diag(covariance)
         in_spline = (
@@ -167,8 +165,9 @@ class Joint:
         if not self.single:
             singles = np.zeros((len(self.points), SPACE))
         elif self.by_corner:
-            back = Y.transpose(0, 2, 1)
-            singles = np.diagonal(inverse, axis1=1, axis2=2) + ((back @ covariance) * back).sum(-1)
+            Y = (sums.B @ inverse).transpose(1, 0, 2).reshape(len(covariance), -1)
+            singles = (Y * (covariance @ Y)).sum(0).reshape(-1, SPACE)
+            singles += np.diagonal(inverse, axis1=1, axis2=2)
         else:
             singles = spread[n:].reshape(-1, SPACE)
         return Known(

@@ -18,6 +18,7 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.decoupled.evidence import Evidence, first_guess
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint
+from orthoscope.methods.decoupled.start import Start, nearer
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lenses import FREE
@@ -26,7 +27,7 @@ from orthoscope.models.target_shape import TargetShape, polynomials, without_sim
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Huber
 
-__all__ = ["FORMULA", "StepOneFit", "fit_step_one"]
+__all__ = ["FORMULA", "LAST_TOLERANCE", "StepOneFit", "fit_step_one", "polished"]
 
 # Beside FREE, a displacement over a formula, step 1's lens may be the formula alone, by this name.
 FORMULA = "formula"
@@ -69,6 +70,16 @@ class StepOneFit:
     status: str
 
     @property
+    def views(self) -> int:
+        """How many it was made from."""
+        return len(self.problem.measurements.observations.order)
+
+    @property
+    def start(self) -> Start:
+        """For other fits to start from."""
+        return Start(self.estimate, self.evidence)
+
+    @property
     def loss(self) -> Huber:
         """How errors count, for noise as large as was found."""
         return _loss(self.evidence.noise)
@@ -101,31 +112,45 @@ class StepOneFit:
         return TargetShape(self.target, without_similarity(points, moved, seen, parts=self.problem.parts))
 
 
-def fit_step_one(flat: Calibration, *, shape: str, first_lens: str) -> StepOneFit:
+def fit_step_one(
+    flat: Calibration,
+    *,
+    shape: str,
+    first_lens: str,
+    near: StepOneFit | None = None,
+    tolerance: float = LAST_TOLERANCE,
+) -> StepOneFit:
     """Camera, poses and shape together.
 
     Args:
         flat: a calibration of a flat target to start from; its parameters are freed.
         shape: of the target, `flat`, `smooth` or `free`.
         first_lens: FREE or FORMULA, the lens.
+        near: another fit of the same target to start from as far as it goes, its base, shape, lens and views
+            whatever they are.
+        tolerance: of the last round.
     """
     detections, free = flat.detections, flat.uncertainty.names
-    camera = _with_displacement(flat.camera) if first_lens == FREE else flat.camera
     observations = Observations.by_corner(detections)
     points, seen = detections.target.points, observations.present.max(0) > 0
     parts = detections.target.parts
     basis = polynomials(points, seen, parts=parts) if shape != "flat" else np.zeros((len(points), 0))
-    energy = _energy(camera)
-    measurements = Measurements(observations, camera, free, corners_move=shape != "flat")
-    estimate = DecoupledEstimate(
-        camera,
-        observations.poses_of(flat.camera_from_target),
-        np.zeros((basis.shape[1], SPACE)),
-        np.zeros((len(points), SPACE)),
+    start = Start(
+        DecoupledEstimate(
+            _with_displacement(flat.camera) if first_lens == FREE else flat.camera,
+            observations.poses_of(flat.camera_from_target),
+            np.zeros((basis.shape[1], SPACE)),
+            np.zeros((len(points), SPACE)),
+        ),
+        first_guess(
+            0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), flat.camera.intrinsics.fx
+        ),
     )
-    evidence = first_guess(
-        0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), camera.intrinsics.fx
-    )
+    if near:
+        start = nearer(start, near.start, free_corners=shape == "free")
+    estimate, evidence = start
+    energy = _energy(estimate.camera)
+    measurements = Measurements(observations, estimate.camera, free, corners_move=shape != "flat")
     noise, loss = evidence.noise, _loss(evidence.noise)
     steps, settled = 0, False
     for round_ in range(ROUND_LIMIT):
@@ -141,7 +166,7 @@ def fit_step_one(flat: Calibration, *, shape: str, first_lens: str) -> StepOneFi
             precisions=precisions,
             parts=parts,
         )
-        options = Options(tolerance=LAST_TOLERANCE if last else ROUND_TOLERANCE, max_steps=50)
+        options = Options(tolerance=tolerance if last else ROUND_TOLERANCE, max_steps=50)
         if abs(evidence.noise / noise - 1.0) > KEPT_LOSS_SHARE:
             noise, loss = evidence.noise, _loss(evidence.noise)
         solution = solve(problem, estimate, loss=loss, options=options)
@@ -155,6 +180,23 @@ def fit_step_one(flat: Calibration, *, shape: str, first_lens: str) -> StepOneFi
         settled = renewed.agrees_with(evidence)
         evidence = renewed
     raise AssertionError("the last round returns")
+
+
+def polished(fit: StepOneFit) -> StepOneFit:
+    """A fit that was stopped early brought to its minimum, weights as they are."""
+    solution = solve(
+        fit.problem, fit.estimate, loss=fit.loss, options=Options(tolerance=LAST_TOLERANCE, max_steps=50)
+    )
+    known = fit.problem.known(solution.sums)
+    evidence = fit.evidence.renewed(fit.problem, solution.unknowns, solution.cost, known)
+    return replace(
+        fit,
+        estimate=solution.unknowns,
+        evidence=evidence,
+        covariance=evidence.noise * known.camera,
+        steps=fit.steps + solution.steps,
+        status=solution.status.value,
+    )
 
 
 def _loss(noise: float) -> Huber:

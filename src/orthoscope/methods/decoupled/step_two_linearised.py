@@ -86,7 +86,9 @@ class PairsLeftOut:
             through = by_error @ rows
             alike += (larger - 1.0) * np.einsum("mfc,mgc->fg", through, through)
         s2 = known.noise
-        return Scatter(self.camera, self.names, s2 * model, s2 * alike, s2 * prior, scattered(self.changes))
+        return Scatter(
+            self.camera, self.names, s2 * model, s2 * alike, s2 * prior, scattered(self.changes), 0.0 * model
+        )
 
     def _steps_one(
         self, corner: ndarray, pose: ndarray, root: ndarray

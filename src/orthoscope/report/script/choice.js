@@ -47,7 +47,7 @@ function choice() {
         r = rows[i];
       return r
         ? {
-            text: `${r.name}: ${px(r.heldOut)}${r.error ? ` ± ${px(r.error)}` : ""}, ${r.loses === 0 ? "taken" : r.loses == null ? "" : r.loses > 0 ? `loses ${px(r.loses)}` : `would gain ${px(-r.loses)}`}`,
+            text: `${r.name}: ${r.told}, ${r.loses === 0 ? "taken" : r.loses == null ? "" : r.loses > 0 ? `loses ${px(r.loses)}` : `would gain ${px(-r.loses)}`}`,
           }
         : null;
     },

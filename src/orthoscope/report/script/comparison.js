@@ -99,7 +99,7 @@ function comparison() {
       const r = rows[Math.round(p.atY(y))];
       return r
         ? {
-            text: `${r.name}: ${r.heldOut == null ? r.failure : `held out ${px(r.heldOut)}${r.error ? ` ± ${px(r.error)}` : ""}, used ${px(r.used)}${r.loses ? `, loses ${px(r.loses)}` : ""}`}`,
+            text: `${r.name}: ${r.heldOut == null ? r.failure : `held out ${r.told}, used ${px(r.used)}${r.loses ? `, loses ${px(r.loses)}` : ""}`}`,
           }
         : null;
     },

@@ -1,0 +1,1 @@
+"""Which target photographs show, before anybody has said so."""

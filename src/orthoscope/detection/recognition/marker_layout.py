@@ -1,0 +1,202 @@
+"""Boards of markers by what their markers say: the dictionary, the layout and the counts.
+
+Each marker is a frame of its own: its four corners make a unit square, in which the markers near it stand
+somewhere. On a grid these places are pitches apart along the axes; on a ChArUco board, a square to the side
+and a square down. Which number stands where tells the columns, and on ChArUco boards whether the first row
+begins with a marker, as it does in the old layout of boards with an even number of rows. Lengths are not
+seen, only their ratios: the description that comes out has lengths of ours in these ratios.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import product
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from orthoscope.detection.copies import resized
+from orthoscope.detection.marker_corners import crossings_of_sides
+from orthoscope.detection.markers import Markers, homography_of
+from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
+from orthoscope.targets.aprilgrid import BORDER_SQUARES, DICTIONARY, AprilGrid
+from orthoscope.targets.board import Board
+from orthoscope.targets.charuco import Charuco
+from orthoscope.targets.grid_board import GridBoard
+from orthoscope.targets.markers import dictionary
+
+__all__ = ["marker_boards"]
+
+# Dictionaries that begin alike, the largest first: with it all their markers are read.
+FAMILIES = (
+    *(tuple(f"DICT_{bits}X{bits}_{size}" for size in (1000, 250, 100, 50)) for bits in (4, 5, 6, 7)),
+    ("DICT_APRILTAG_36h11",),
+    ("DICT_APRILTAG_36h10",),
+    ("DICT_APRILTAG_25h9",),
+    ("DICT_APRILTAG_16h5",),
+    ("DICT_ARUCO_MIP_36h12",),
+    ("DICT_ARUCO_ORIGINAL",),
+)
+# The longer side of the copy in which markers are read, pixels.
+COPY_SIDE = 1280
+# In so many photographs every dictionary is tried.
+TRIED_PHOTOGRAPHS = 3
+# A board shows at least so many different markers.
+FEWEST_MARKERS = 4
+# A number that is seen less often than this share of the commonest one was misread.
+LEAST_SEEN_SHARE = 0.15
+# So many markers around each one are compared with a layout.
+NEIGHBOURS = 4
+# A marker is where a layout has it when it is no farther from there than this share of a pitch.
+NEAR_SHARE = 0.3
+# A layout is believed when it has so many of the neighbours where they are seen.
+LEAST_FITTING_SHARE = 0.8
+# Boards have at most so many columns.
+MOST_COLUMNS = 40
+# A square of a ChArUco board, or a marker of a grid, as it is then described, metres.
+NOMINAL = 0.03
+
+Layout = Callable[[Int[ndarray, " n"]], Float[ndarray, "n 2"]]
+
+
+class _Neighbours(NamedTuple):
+    """Markers and those near them: numbers (k,) of both, and where the second stands in the first's frame, in
+    its sides (k,2).
+    """
+
+    here: Int[ndarray, " k"]
+    there: Int[ndarray, " k"]
+    away: Float[ndarray, "k 2"]
+
+
+def marker_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
+    """The board that the markers of photographs (h,w) make, if they make one."""
+    copies = [resized(grey, COPY_SIDE) for grey in greys]
+    best: tuple[int, tuple[str, ...], int] = (0, FAMILIES[0], 1)
+    for family in FAMILIES:
+        for border in (1, BORDER_SQUARES) if family[0] == DICTIONARY else (1,):
+            total = sum(len(_read(copy, family[0], border).numbers) for copy in copies[:TRIED_PHOTOGRAPHS])
+            best = max(best, (total, family, border), key=lambda one: one[0])
+    total, family, border = best
+    if not total:
+        return
+    read = [_read(copy, family[0], border) for copy in copies]
+    numbers = _known(read)
+    if len(numbers) < FEWEST_MARKERS:
+        return
+    modules = int(dictionary(family[0]).markerSize) + 2 * border
+    read = [
+        Markers(markers.numbers, crossings_of_sides(copy, markers.corners, modules)[0])
+        for copy, markers in zip(copies, read, strict=True)
+    ]
+    name = min((one for one in family if _size(one) > numbers.max()), key=_size)
+    near = _neighbours(read, numbers)
+    if not len(near.here):
+        return
+    try:
+        board = _laid_out(near, numbers, name, border)
+    except InputError:  # what it seems to be cannot be
+        return
+    if board:
+        yield board
+
+
+def _size(name: str) -> int:
+    return len(dictionary(name).bytesList)
+
+
+def _read(copy: ndarray, name: str, border: int) -> Markers:
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.markerBorderBits = border
+    corners, numbers, _ = cv2.aruco.ArucoDetector(dictionary(name), parameters).detectMarkers(copy)
+    if numbers is None:
+        return Markers(np.zeros(0, dtype=int), np.zeros((0, 4, 2)))
+    where = np.concatenate(corners).reshape(-1, 4, 2).astype(float)
+    return Markers(np.asarray(numbers).ravel().astype(int), where)
+
+
+def _known(read: Sequence[Markers]) -> Int[ndarray, " n"]:
+    """The numbers that are the board's, not misread ones."""
+    counts = Counter(number for markers in read for number in set(markers.numbers.tolist()))
+    most = max(counts.values(), default=0)
+    return np.array(sorted(n for n, count in counts.items() if count > LEAST_SEEN_SHARE * most), dtype=int)
+
+
+def _neighbours(read: Sequence[Markers], numbers: Int[ndarray, " n"]) -> _Neighbours:
+    unit = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    here, there, away = [], [], []
+    for markers in read:
+        known = np.isin(markers.numbers, numbers)
+        mine, corners = markers.numbers[known], markers.corners[known]
+        middles = corners.mean(1)
+        for i, own in enumerate(corners if len(corners) > 1 else ()):
+            places = cv2.perspectiveTransform(middles[None], np.linalg.inv(homography_of(unit, own)))[0]
+            far = np.hypot(*places.T)
+            far[i] = np.inf
+            nearest = np.argsort(far)[: min(NEIGHBOURS, len(corners) - 1)]
+            here += [mine[i]] * len(nearest)
+            there += mine[nearest].tolist()
+            away += places[nearest].tolist()
+    return _Neighbours(np.array(here, dtype=int), np.array(there, dtype=int), np.array(away).reshape(-1, 2))
+
+
+def _laid_out(near: _Neighbours, numbers: Int[ndarray, " n"], name: str, border: int) -> Board | None:
+    """The board whose layout has most neighbours where they are seen."""
+    far = np.hypot(*near.away.T)
+    pitch, most = float(np.median(far[far < 1.2 * far.min()])), int(numbers.max())
+    square = pitch / np.sqrt(2.0)
+    tried: list[tuple[float, Callable[[], Board]]] = []
+    for first in dict.fromkeys((0, int(numbers.min()))):
+        for columns in range(1, min(MOST_COLUMNS, most - first + 1) + 1):
+            rows = -(-(most - first + 1) // columns)
+            turns, layout = (range(4), _upwards) if border == BORDER_SQUARES else (range(1), _downwards)
+            fit = max(_fitting(near, pitch, layout(columns, first), turn) for turn in turns)
+            tried.append((fit, partial(_grid, columns, rows, pitch - 1.0, name, border, first)))
+        for columns, start in product(range(3, MOST_COLUMNS + 1), (1, 0)):
+            fit = _fitting(near, square, _chequered(columns, first, start))
+            tried.append((fit, partial(_charuco, columns, start, square, name, first, most)))
+    fit, board = max(tried, key=lambda one: one[0])
+    return board() if fit > LEAST_FITTING_SHARE else None
+
+
+def _fitting(near: _Neighbours, pitch: float, layout: Layout, turn: int = 0) -> float:
+    """The share of neighbours that a layout has where they are seen, markers turned by quarters."""
+    quarter = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), turn)
+    off = near.away @ quarter.T - pitch * (layout(near.there) - layout(near.here))
+    return float((np.hypot(*off.T) < NEAR_SHARE * pitch).mean())
+
+
+def _downwards(columns: int, first: int) -> Layout:
+    return lambda numbers: np.stack(np.divmod(numbers - first, columns)[::-1], axis=1).astype(float)
+
+
+def _upwards(columns: int, first: int) -> Layout:
+    return lambda numbers: _downwards(columns, first)(numbers) * [1.0, -1.0]
+
+
+def _chequered(columns: int, first: int, start: int) -> Layout:
+    """Row by row in every other square; start: the column of the first."""
+
+    def layout(numbers: Int[ndarray, " n"]) -> Float[ndarray, "n 2"]:
+        pair, rest = np.divmod(numbers - first, columns)  # two rows have as many markers as there are columns
+        in_first = (columns + (1 - start)) // 2
+        second = rest >= in_first
+        row = 2 * pair + second
+        column = np.where(second, 2 * (rest - in_first) + (1 - start), 2 * rest + start)
+        return np.stack([column, row], axis=1).astype(float)
+
+    return layout
+
+
+def _grid(columns: int, rows: int, gap: float, name: str, border: int, first: int) -> Board:
+    if border == BORDER_SQUARES:
+        return AprilGrid(columns, rows, NOMINAL, round(gap, 2), first)
+    return GridBoard(columns, rows, NOMINAL, round(gap * NOMINAL, 4), name, first)
+
+
+def _charuco(columns: int, start: int, square: float, name: str, first: int, most: int) -> Board:
+    rows = int(_chequered(columns, first, start)(np.array([most]))[0, 1]) + 1
+    return Charuco(columns, rows, NOMINAL, round(NOMINAL / square, 4), name, start == 0, first)

@@ -1,0 +1,121 @@
+"""Which target some photographs show: what markers, corners and discs speak for, tried on them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from orthoscope.detection.chessboard import board_size, lattice_sizes
+from orthoscope.detection.recognition.disc_layout import disc_boards
+from orthoscope.detection.recognition.marker_layout import marker_boards
+from orthoscope.detection.sight import Sight
+from orthoscope.detection.table import see
+from orthoscope.files.images import MOST_MEGAPIXELS
+from orthoscope.files.pictures import Given, pictures
+from orthoscope.geometry.arrays import CalibrationError, InputError, ndarray
+from orthoscope.targets.board import Board
+from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.marked_chessboard import MarkedChessboard
+from orthoscope.targets.target import Target, target_of
+
+__all__ = ["Recognised", "recognise"]
+
+# So many photographs are looked at, evenly picked.
+LOOKED_AT = 8
+# Lattices of one size in fewer photographs agree by chance.
+ENOUGH_TO_AGREE = 3
+# A square of a chessboard, as it is described, metres.
+NOMINAL = 0.025
+
+
+class Recognised(NamedTuple):
+    """What photographs seem to show.
+
+    Attributes:
+        target: with lengths of ours, since photographs show ratios only.
+        seen: how many of the photographs show it.
+        looked_at: how many were looked at.
+    """
+
+    target: Target
+    seen: int
+    looked_at: int
+
+    @property
+    def sentence(self) -> str:
+        """What is seen, and what to say next."""
+        return (
+            f"{self.seen} of {self.looked_at} photographs that were looked at show {self.target.name}, up to"
+            " its lengths, which no photograph tells: measure them, and say --target with the true ones"
+        )
+
+
+def recognise(photographs: Given, *, most_megapixels: float = MOST_MEGAPIXELS) -> Recognised:
+    """The target that most of some photographs show.
+
+    Args:
+        photographs: as in `detect`.
+        most_megapixels: larger ones are passed over.
+    Raises:
+        InputError: there are no photographs.
+        CalibrationError: none of the kinds of target is seen.
+    """
+    greys = _some(photographs, most_megapixels)
+    best: tuple[int, int, Target] | None = None
+    for board in _candidates(greys):
+        target = target_of(board)
+        sights = [sight for grey in greys if isinstance(sight := see(grey, target), Sight)]
+        found = len(sights), sum(len(sight.ids) for sight in sights), target
+        if sights and (best is None or found[:2] > best[:2]):
+            best = found
+    if best is None:
+        raise CalibrationError(
+            f"none of {len(greys)} photographs shows a chessboard whose four sides are seen, markers in a"
+            " known layout, or a grid of discs, nor is a chessboard of one size in most of them. Say which"
+            " target it is, or photograph the whole of it."
+        )
+    return Recognised(best[2], best[0], len(greys))
+
+
+def _some(photographs: Given, most_megapixels: float) -> list[ndarray]:
+    given, greys = pictures(photographs), []
+    for picture in given[:: max(1, -(-len(given) // LOOKED_AT))]:
+        try:
+            greys.append(picture.grey(most_megapixels=most_megapixels))
+        except InputError:  # `detect` says what is wrong with it
+            continue
+    if not greys:
+        raise InputError(f"none of {len(given)} photographs can be read; expected images.")
+    return greys
+
+
+def _candidates(greys: Sequence[ndarray]) -> Iterator[Board]:
+    """Boards that may be it; of two that are as often seen the first is taken."""
+    whole = Counter(size for grey in greys if (size := board_size(grey)))
+    if max(whole.values(), default=0) <= 0.5 * len(
+        greys
+    ):  # squares of a plain board take long to be no markers
+        yield from marker_boards(greys)
+    sizes = [size for size, _ in whole.most_common(2)] or _again_and_again(greys) or [_at_least(greys)]
+    for columns, rows in sizes:
+        if min(columns, rows) >= 4:
+            yield MarkedChessboard(columns, rows, NOMINAL)
+            yield MarkedChessboard(rows, columns, NOMINAL)
+        if min(columns, rows) >= 3:
+            yield Chessboard(columns, rows, NOMINAL)
+    yield from disc_boards(greys)
+
+
+def _again_and_again(greys: Sequence[ndarray]) -> list[tuple[int, int]]:
+    """The size of the lattice that is in most photographs, for boards without a white margin, whose sides are
+    not seen: what does not belong to a board changes its size from one photograph to the next.
+    """
+    sizes = Counter(size for grey in greys for size in lattice_sizes(grey))
+    return [size for size, seen in sizes.most_common(1) if seen >= max(ENOUGH_TO_AGREE, 0.5 * len(greys))]
+
+
+def _at_least(greys: Sequence[ndarray]) -> tuple[int, int]:
+    """The columns and rows of the largest part of a chessboard, where no photograph shows all four sides."""
+    parts = [size for grey in greys if (size := board_size(grey, whole=False))] or [(0, 0)]
+    return max(columns for columns, _ in parts), max(rows for _, rows in parts)

@@ -1,0 +1,131 @@
+"""Two ways to fit a model: to compare it with others, and to keep it.
+
+What is compared starts from what was fitted before it and ends where the rest would change no choice. What is
+kept starts from nothing, so that it is the same whatever it was compared with; of many photographs some are
+fitted first, and all from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Protocol
+
+from orthoscope.fitting.calibration import Calibration
+from orthoscope.methods.decoupled.model import Model
+from orthoscope.methods.decoupled.representative import representative
+from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one, polished
+from orthoscope.methods.fccm import fit_flat
+from orthoscope.models.target_shape import SHAPES
+from orthoscope.targets.detections import Detections
+
+__all__ = ["Compared", "Fitter", "Kept", "some_of"]
+
+# The choice from so many views, spread as widely as all, is that of all.
+ENOUGH_VIEWS = 40
+# A fit that is compared with others ends at this tolerance: a share of squared errors that no rule sees.
+COMPARED_TOLERANCE = 1e-4
+
+
+class Fitter(Protocol):
+    """Fits models of step 1."""
+
+    def flat(self, base: str) -> Calibration:
+        """With a flat target and this formula.
+
+        Raises CalibrationError where the views cannot tell them.
+        """
+        ...
+
+    def step_one(self, model: Model) -> StepOneFit:
+        """The fit; raises as `flat` does."""
+        ...
+
+
+def some_of(detections: Detections) -> Detections:
+    """The views that a choice is made from, and a fit of all starts from."""
+    return representative(detections, ENOUGH_VIEWS)
+
+
+class Compared:
+    """Each model from the nearest that was fitted before.
+
+    Args:
+        detections: the views.
+        skew: whether K has one.
+        flats: calibrations of a flat target that are there already, by their base.
+    """
+
+    def __init__(self, detections: Detections, *, skew: bool, flats: Mapping[str, Calibration]) -> None:
+        self.cold: dict[Model, StepOneFit] = {}
+        self.flat = _flats(detections, skew, flats)
+        self._fitted: dict[Model, StepOneFit] = {}
+
+    def step_one(self, model: Model) -> StepOneFit:
+        """Started from a richer one, on the same base where there is one, and ended early."""
+        near = self._nearest(model)
+        fit = _fit(self.flat(model.base), model, near)
+        self._fitted[model] = fit
+        if near is None:
+            self.cold[model] = fit
+        return fit
+
+    def _nearest(self, model: Model) -> StepOneFit | None:
+        richer = [
+            (other.base == model.base, fit)
+            for other, fit in self._fitted.items()
+            if SHAPES.index(other.shape) >= SHAPES.index(model.shape)
+        ]
+        return max(richer, key=lambda pair: pair[0])[1] if richer else None
+
+
+class Kept:
+    """Each model from nothing and to the last digit.
+
+    Args:
+        detections, skew, flats: as of `Compared`.
+        cold: fits that started from nothing, of `some_of` the views.
+    """
+
+    def __init__(
+        self,
+        detections: Detections,
+        *,
+        skew: bool,
+        flats: Mapping[str, Calibration] | None = None,
+        cold: Mapping[Model, StepOneFit] | None = None,
+    ) -> None:
+        some, flats = some_of(detections), flats or {}
+        self._all, self._cold = some is detections, cold or {}
+        self.flat = _flats(detections, skew, flats)
+        self._flat_of_some = self.flat if self._all else _flats(some, skew, flats)
+
+    def step_one(self, model: Model) -> StepOneFit:
+        """Some of the views first, then all."""
+        cold = self._cold.get(model) or _fit(self._flat_of_some(model.base), model, None)
+        if self._all:
+            return polished(cold)
+        return fit_step_one(self.flat(model.base), shape=model.shape, first_lens=model.first_lens, near=cold)
+
+
+def _flats(
+    detections: Detections, skew: bool, known: Mapping[str, Calibration]
+) -> Callable[[str], Calibration]:
+    """Calibrations of a flat target by their base, each made once; those that are there already are taken
+    where they are of these very views.
+    """
+
+    @cache
+    def flat(base: str) -> Calibration:
+        there = known.get(base)
+        if there is not None and there.detections is detections:
+            return there
+        return fit_flat(detections, lens=base, skew=skew)
+
+    return flat
+
+
+def _fit(flat: Calibration, model: Model, near: StepOneFit | None) -> StepOneFit:
+    return fit_step_one(
+        flat, shape=model.shape, first_lens=model.first_lens, near=near, tolerance=COMPARED_TOLERANCE
+    )
