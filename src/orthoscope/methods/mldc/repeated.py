@@ -48,7 +48,7 @@ from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
 
-__all__ = ["Ended", "Rounds", "joint_parameters", "repeat"]
+__all__ = ["Ended", "Rounds", "in_gauge", "joint_parameters", "repeat"]
 
 # Where a round moves corners by less, and less is still to go, px rms, nothing changes any more.
 SETTLED_PX = 1e-6
@@ -154,7 +154,7 @@ def repeat(
         start = _through_stages(bases, nearest, lens, loss)
     else:
         fit = fit_centred_lens(*pairs, pinhole=nearest.camera, lens=lens, loss=loss)
-        start = Estimate(_in_gauge(fit.unknowns, bases.narrowing.free), nearest.poses)
+        start = Estimate(in_gauge(fit.unknowns, bases.narrowing.free), nearest.poses)
     own = _Repetition(bases, joint_parameters(bases.narrowing.free, lens), loss)
     return own.run(start, rounds, progress)
 
@@ -177,7 +177,7 @@ def _through_stages(bases: StartingCameras, nearest: Estimate, lens: str, loss: 
     return here
 
 
-def _in_gauge(camera: Camera, of_pinhole: Sequence[str]) -> Camera:
+def in_gauge(camera: Camera, of_pinhole: Sequence[str]) -> Camera:
     """The same image with slope 1 at the centre: K stretched about it instead, so far as K's parameters"
     " move."""
     name, frame = GAUGE.get(type(camera.lens)), camera.lens_frame
