@@ -64,9 +64,8 @@ def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
     )
     where_to = "one camera" if one else "different cameras"
     finding = (
-        f"{len(ends)} searches of the same data, all with J < {PERFECT_COST:g}, end at {where_to}: {of_each}"
-        " px, "
-        f"up to {apart:.2g} px apart; test NCE {span(nce)}."
+        f"{len(ends)} searches of the same data, all with J < {PERFECT_COST:g}, end at {where_to}:"
+        f" {of_each} px, up to {apart:.2g} px apart; test NCE {span(nce)}."
     )
     return Claim(where, paper, verdict, finding)
 

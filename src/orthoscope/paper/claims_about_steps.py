@@ -73,9 +73,8 @@ def time_grows(where: str, timings: Sequence[Timing]) -> Claim:
     first, last = own[0], own[-1]
     finding = (
         f"The search of eq. (7) takes {first.seconds:.1f} s with {first.images} images ({first.unknowns}"
-        f" unknowns) and"
-        f" {last.seconds:.1f} s with {last.images} ({last.unknowns}), where the paper had a minute to an"
-        f" hour."
+        f" unknowns) and {last.seconds:.1f} s with {last.images} ({last.unknowns}), where the paper had a"
+        " minute to an hour."
     )
     return Claim(where, paper, share(sum(grows), len(grows)), finding)
 

@@ -45,26 +45,22 @@ WEIGHTS = Sentence(
 ALWAYS_PERFECT = Sentence(
     "3.1",
     "In our experiments, the non-linear searching has always converged to a place where points in images"
-    " satisfy"
-    " all template restrictions perfectly, but the computing time has lasted from 1 min to 1 h.",
+    " satisfy all template restrictions perfectly, but the computing time has lasted from 1 min to 1 h.",
 )
 ACCURATE_FROM_THREE = Sentence(
     "3.1",
     "If the number of images increase the searching time increase also, but the result is always a set of"
-    " control"
-    " points of all images satisfying template restrictions and an accurate camera model.",
+    " control points of all images satisfying template restrictions and an accurate camera model.",
 )
 FAR_FROM_FEW = Sentence(
     "3.1",
     "Therefore, when m < 3 the result of the non-linear searching can compute a pin-hole model which"
-    " diverges to a"
-    " place far away of the right one.",
+    " diverges to a place far away of the right one.",
 )
 ONE_IMAGE = Sentence(
     "3.2",
     "For the proposed method, the number of images to resolve the model is only one, although several"
-    " images are"
-    " necessary for the previous step and they can be used now.",
+    " images are necessary for the previous step and they can be used now.",
 )
 DEGREE = Sentence(
     "3.2",
@@ -75,8 +71,7 @@ NO_LONGER_SATISFIED = Sentence("4.1", "When data change, the computed model no l
 ALIKE_ON_TEST = Sentence(
     "4.1",
     "Finally with MLDC, lens distortion is represented by the computed model and when the data change the"
-    " normalized"
-    " error is similar.",
+    " normalized error is similar.",
 )
 EXACT_WITHOUT_NOISE = Sentence(
     "4.1", "In the absence of noise, a small number of training points can yield 100% accuracy."
@@ -85,8 +80,7 @@ GREATER_ERRORS = Sentence("4.1", "Again NMLDC gives greater errors.")
 BETTER_STRAIGHTENED = Sentence(
     "4.2",
     "Distortion correction with MLDC method seems to be more accurate than undistorted images with the"
-    " NMLDC or FCCM"
-    " methods.",
+    " NMLDC or FCCM methods.",
 )
 BETTER_TRAINED = Sentence("4.2", "The FCCM method obtains better results in the training step.")
 BETTER = Sentence(
@@ -95,6 +89,5 @@ BETTER = Sentence(
 STABLE = Sentence(
     "5",
     "This method guaranties stability when non-linear searching is solved and also when the distortion"
-    " center is"
-    " computed.",
+    " center is computed.",
 )

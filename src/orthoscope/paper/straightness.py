@@ -1,10 +1,8 @@
 """How straight a camera makes the rows and columns of a target: what Fig. 7 shows to the eye, as a number.
 
 The corners are taken back through the lens and a line is fitted to each row and column; the distances from
-it, rms,
-are in pixels of the photograph: each line is measured by its length there, so that a straight image that is
-small
-gains nothing.
+it, rms, are in pixels of the photograph: each line is measured by its length there, so that a straight image
+that is small gains nothing.
 """
 
 from __future__ import annotations

@@ -81,8 +81,7 @@ def stable_centre(results: Results) -> tuple[Claim, ...]:
         verdict = ClaimVerdict.HOLDS if spread[MLDC] < STEADY_PX else ClaimVerdict.FAILS
         finding = (
             f"Over {mldc.trials} trials its centre is at ({mldc.x[0]:.1f}, {mldc.y[0]:.1f}) px; standard"
-            " deviations of the"
-            f" worse coordinate, px: {each_of(spread)}."
+            f" deviations of the worse coordinate, px: {each_of(spread)}."
         )
         said.append(Claim(where, paper, verdict, finding))
     return tuple(said)

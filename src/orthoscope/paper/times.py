@@ -1,8 +1,7 @@
 """How long a method takes for how many images: the paper's minute to hour.
 
 Processor time of this process, so that other work on the machine adds little; still the one thing here that
-no seed
-repeats.
+no seed repeats.
 """
 
 from __future__ import annotations

@@ -6,8 +6,7 @@
 
 R. Hartley and S. B. Kang, Parameter-free radial distortion correction with center of distortion estimation,
 PAMI 29(8), 2007. All is linear but for the last pixels of the centre, and nothing is fitted jointly: lens
-first,
-then pin-hole.
+first, then pin-hole.
 """
 
 from __future__ import annotations

@@ -3,16 +3,11 @@
 Every corner lies on the line from the centre that its place on the target tells, however far out.
 
 With h_1, h_2 the first rows of a view's homography about the centre e, X = (X, Y, 1) a place on the target
-and p its
-pixel, (p - e) is parallel to (h_1 X, h_2 X): the radial alignment of R. Tsai (1987), and the radial
-fundamental
-matrix F = [e]x H, p' F X = 0, of R. Hartley and S. B. Kang (PAMI 29(8), 2007). F comes from eight corners
-or more
-of a view, linearly, and e is what all views' F leave out. That start is then made as good as the corners
-are: the
-distances of the corners from their radial lines, pixels, are least at e, with h_1 and h_2 of each view the
-best for
-that e.
+and p its pixel, (p - e) is parallel to (h_1 X, h_2 X): the radial alignment of R. Tsai (1987), and the radial
+fundamental matrix F = [e]x H, p' F X = 0, of R. Hartley and S. B. Kang (PAMI 29(8), 2007). F comes from eight
+corners or more of a view, linearly, and e is what all views' F leave out. That start is then made as good as
+the corners are: the distances of the corners from their radial lines, pixels, are least at e, with h_1 and
+h_2 of each view the best for that e.
 """
 
 from __future__ import annotations
