@@ -146,7 +146,7 @@ def own_entry(text: str) -> PaperEntry:
         entry = parse_entry(what)
         return PaperEntry(name, entry.method, entry.settings)
     try:
-        function = getattr(importlib.import_module(module), attribute)
+        function: Any = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, ValueError) as error:
         raise InputError(
             f"--with {text!r} names no method ({error}); expected module:function with a function that takes"

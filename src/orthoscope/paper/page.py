@@ -96,11 +96,11 @@ def paper_page(
         centres=_centres(results),
         stable=stable_centre(results),
         step_two=[
-            (r.scene, r.name, f"{r.steps:.0f}", _nce(r.test_nce), *(_number(c, 1) for c in r.centre))
+            (r.scene, r.name, f"{r.steps:.0f}", _nce(r.test_nce), *(fixed(c, 1) for c in r.centre))
             for r in step_two_rows(results)
         ],
         of_step_two=step_two_claims(results),
-        timings=[(t.images, t.entry, t.unknowns, _number(t.seconds, 2), t.steps) for t in results.timings],
+        timings=[(t.images, t.entry, t.unknowns, fixed(t.seconds, 2), t.steps) for t in results.timings],
         of_times=time_claims(results),
         printed=[entry.name for entry in PAPER],
         failures=_failures(results),
@@ -200,7 +200,7 @@ def _fig1(first: FirstFigure | None) -> dict[str, Any] | None:
         "size": (width, height),
         "box": " ".join(f"{value:.0f}" for value in (*low, *(high - low))),
         "pairs": [[f"{value:.2f}" for value in (*one, *other)] for one, other in pairs],
-        "farthest": _number(float(np.hypot(*(first.corrected - first.detected).T).max()), 1),
+        "farthest": fixed(float(np.hypot(*(first.corrected - first.detected).T).max()), 1),
     }
 
 

@@ -112,7 +112,7 @@ def _off_line(rows: Float[ndarray, "n k"], radius: Float[ndarray, " n"]) -> Floa
 
 def _least(deviations: Float[ndarray, "n k"], scale: Float[ndarray, " k"]) -> Float[ndarray, " k"]:
     """The h with the least deviations whose scale @ h is 1."""
-    R = np.linalg.qr(deviations, mode="r")
+    R: ndarray = np.linalg.qr(deviations).R
     towards = np.linalg.lstsq(R.T, scale, rcond=None)[0]
     h = np.linalg.lstsq(R, towards, rcond=None)[0]
     return h / (scale @ h)
