@@ -152,11 +152,22 @@ SCENARIOS: tuple[Scenario, ...] = (
         grades=(REGION, USABLE, NO),
         causes=FEW,
     ),
+    Scenario(
+        "seven views, little tilt",
+        _with(standing=_held(count=7, tilt=(3.0, 15.0))),
+        grades=(GOOD, REGION, USABLE),
+        causes=FEW,
+    ),
     # The target is not what it is said to be; the default finds its shape, fccm takes it as said.
     Scenario("bent by 1.2 % of its size", _with(shape={"bend": 0.012})),
     Scenario("sagging", _with(shape={"sag": 0.004})),
     Scenario("wavy paper", _with(shape={"wave": 0.002}, standing=_held(count=20))),
     Scenario("stretched by 1 %", _with(shape={"stretch": 0.01})),
+    Scenario(
+        "stretched by .2 %, always upright",
+        _with(shape={"stretch": 0.002}, standing=_held(roll=3.0)),
+        grades=(GOOD, REGION, USABLE),
+    ),
     Scenario("every corner elsewhere", _with(shape={"singles": 0.0006}, standing=_held(count=20))),
     Scenario("bent, fccm", _with(shape={"bend": 0.012}), FLAT, NOT_GOOD, ("target",)),
     Scenario("dented, fccm", _with(shape={"dent": 0.006}), FLAT, NOT_GOOD, ("target",)),

@@ -22,13 +22,14 @@ from orthoscope.evaluation.metrics import nce_of
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit, reference_fit
 from orthoscope.evaluation.suspects import ViewError
-from orthoscope.evaluation.unseen_views import USUAL_FOLDS, in_folds, in_turn
+from orthoscope.evaluation.unseen_views import in_folds, in_turn
 from orthoscope.evaluation.verdict.facts import Findings, situation_of
 from orthoscope.evaluation.verdict.situation import NOTHING_KNOWN, Situation
 from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.fits import Fits
+from orthoscope.fitting.held_out import USUAL_FOLDS
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray

@@ -23,7 +23,7 @@ from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
 from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
 from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.disc_centres import has_outlines
-from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views, held_out, rms_and_error
+from orthoscope.fitting.held_out import FEWEST_VIEWS, USUAL_FOLDS, folds_of_views, held_out, rms_and_error
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
@@ -99,7 +99,7 @@ def compare(
     detections: Detections,
     entries: Sequence[Entry | str] = USUAL,
     *,
-    folds: int = 5,
+    folds: int = USUAL_FOLDS,
     executor: Executor | None = None,
     progress: Progress | None = None,
     clock: Callable[[], float] = time.perf_counter,
