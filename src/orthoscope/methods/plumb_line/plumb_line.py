@@ -123,7 +123,7 @@ def lens_of_edges(edges: Sequence[Edge], image_size: tuple[int, int], *, lens: s
 def _best(
     edges: Sequence[Edge], used: ndarray, image_size: tuple[int, int], formulas: Sequence[LineFormula]
 ) -> tuple[LineFormula, StraightLens, Float[ndarray, " e"]]:
-    """The formula that the used edges speak for, its lens, and how far from straight that leaves every edge."""
+    """The formula that the used edges speak for, its lens, and how far from straight it leaves every edge."""
     _check_enough(int(used.sum()), "that one lens makes straight")
     chosen = [edge for edge, one in zip(edges, used, strict=True) if one]
     fits = [(formula, _fitted(chosen, image_size, formula)) for formula in formulas]
