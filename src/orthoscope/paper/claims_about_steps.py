@@ -13,7 +13,7 @@ from orthoscope.paper.entries import FCCM, MLDC, NMLDC, REPEATED
 from orthoscope.paper.step_two import DEGREES, IMAGES, PAPER_DEGREE, name_of_degree, name_of_images
 from orthoscope.paper.times import Timing
 from orthoscope.paper.trials import Outcome
-from orthoscope.paper.wording import each_of
+from orthoscope.paper.wording import each_of, joined_words
 
 __all__ = ["better_straightened", "degree_does_not_matter", "one_image_is_enough", "time_grows"]
 
@@ -37,8 +37,9 @@ def degree_does_not_matter(where: str, outcomes: Sequence[Outcome]) -> Claim:
         for name in others
         if abs(steps[name] / steps[fifth] - 1) <= ALIKE and abs(nce[name] / nce[fifth] - 1) <= ALIKE
     ]
+    rounds = joined_words([f"{steps[name]:.0f} for {name}" for name in names])
     finding = (
-        f"The rounds of both steps are {each_of(steps)}, the test NCE {each_of(nce)}: both within"
+        f"The rounds of both steps are {rounds}, the test NCE is {each_of(nce)}: both within"
         f" {100 * ALIKE:.0f} % of the fifth degree's for {len(alike)} of {len(others)} others."
     )
     return Claim(where, paper, share(len(alike), len(others)), finding)
@@ -72,8 +73,8 @@ def time_grows(where: str, timings: Sequence[Timing]) -> Claim:
     grows = [one.seconds < other.seconds for one, other in pairwise(own)]
     first, last = own[0], own[-1]
     finding = (
-        f"The search of eq. (7) takes {first.seconds:.1f} s with {first.images} images ({first.unknowns}"
-        f" unknowns) and {last.seconds:.1f} s with {last.images} ({last.unknowns}), where the paper had a"
+        f"The search of eq. (7) takes {first.seconds:.2g} s with {first.images} images ({first.unknowns}"
+        f" unknowns) and {last.seconds:.2g} s with {last.images} ({last.unknowns}), where the paper had a"
         " minute to an hour."
     )
     return Claim(where, paper, share(sum(grows), len(grows)), finding)

@@ -309,23 +309,21 @@ def _lenses(results: Results) -> list[tuple[str, str, list[Cell], str]]:
 
 
 def _parameters(table: list[ParameterColumn]) -> list[tuple[str, list[str]]]:
-    """Table 1 as the paper prints it, a row for each parameter and a column for each method, the names
-    first.
-    """
-    rows = [("", [column.name for column in table])]
-    labels = {"fx": "fx (px)", "fy": "fy (px)", "cu": "cu (px)", "cv": "cv (px)", "gamma": "gamma (deg)"}
-    for key, label in labels.items():
-        decimals = GAMMA_DECIMALS if key == "gamma" else 2
-        rows.append(
-            (
-                label,
-                [_with_spread(column.values[key], decimals) for column in table],
-            )
+    """Table 1 turned over, so that it fits a page: a row for each method, the names of the numbers first."""
+    decimals = {"fx": 2, "fy": 2, "cu": 2, "cv": 2, "gamma": GAMMA_DECIMALS}
+    units = [f"{key} ({'deg' if key == 'gamma' else 'px'})" for key in decimals]
+    return [("", [*units, "training NCE", "test NCE", "no camera"])] + [
+        (
+            column.name,
+            [
+                *(_with_spread(column.values[key], digits) for key, digits in decimals.items()),
+                _nce(column.training_nce),
+                _nce(column.test_nce),
+                str(column.failures),
+            ],
         )
-    rows.append(("Training error (NCE)", [_nce(column.training_nce) for column in table]))
-    rows.append(("Testing error (NCE)", [_nce(column.test_nce) for column in table]))
-    rows.append(("Splits without a camera", [str(column.failures) for column in table]))
-    return rows
+        for column in table
+    ]
 
 
 def _nce(value: float) -> str:

@@ -61,6 +61,8 @@ def centres(results: Results) -> list[Centre]:
             own = [j for j in of_entry if (j.centre_x, j.centre_y) != (j.cx, j.cy)]
             if own and len(own) == len(of_entry):
                 x, y = np.array([(j.centre_x, j.centre_y) for j in own]).T
+                if len(own) > 1 and np.ptp(x) == 0:
+                    continue  # it is taken for granted, not computed
                 found.append(Centre(scene, name, len(own), (_mean(x), _spread(x)), (_mean(y), _spread(y))))
     return found
 
