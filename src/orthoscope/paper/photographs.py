@@ -144,7 +144,7 @@ def _camera_of(entry: PaperEntry, training: Detections) -> Camera:
 
 
 def _camera_of_edges(paths: list[Path]) -> Camera:
-    """That of the plumb line, which needs no corners: edges of the training photographs, whatever they show."""
+    """The plumb line's, which needs no corners: of the edges in photographs, whatever they show."""
     return lens_of_photographs(paths).camera
 
 
