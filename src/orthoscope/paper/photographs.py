@@ -47,8 +47,8 @@ SHOWN_BESIDE = (
     PaperEntry("hartley_kang", "hartley_kang", {}),
 )
 PLUMB_LINE = "plumb line, edges alone"
-# With fewer views a split tests on a single photograph.
-FEWEST_VIEWS = 8
+# With fewer photographs a split tests on a single one.
+FEWEST_PHOTOGRAPHS = 8
 
 
 class Straightened(NamedTuple):
@@ -67,10 +67,10 @@ def check_views(detections: Detections) -> None:
     Raises:
         CalibrationError: there are too few.
     """
-    if len(detections.views) < FEWEST_VIEWS:
+    if len(detections.views) < FEWEST_PHOTOGRAPHS:
         raise CalibrationError(
             f"the target was found in {len(detections.views)} photographs; the paper's comparison needs"
-            f" {FEWEST_VIEWS} at least, of which one in four is for testing. Take more photographs."
+            f" {FEWEST_PHOTOGRAPHS} at least, of which one in four is for testing. Take more photographs."
         )
 
 
