@@ -70,7 +70,7 @@ NUMBERS, GRIDS = _Numbers(), _Grids()
 @click.option(
     "--trials",
     type=click.IntRange(1),
-    help="Averaged in figures 4 and 5, at most 10 in the others; 25, or 2 with --quick.",
+    help="Averaged in figures 4 and 5, at most 8 in the others; 25, or 2 with --quick.",
 )
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of all that is random.")
 @click.option(

@@ -117,7 +117,7 @@ class Plan:
     weights: tuple[tuple[float, float, float], ...] = WEIGHTS
     eq7: Condition = Condition(PAPER_NOISE_PX)
     grids: int = GRID_COUNT
-    most_trials: int = 10
+    most_trials: int = 8
     most_table_trials: int = 5
     timed: tuple[int, ...] = (3, 5, 10, 15)
     only: tuple[str, ...] = ()

@@ -45,6 +45,7 @@ def fitzgibbon(detections: Detections, *, lens: str = "auto", skew: bool = False
         CalibrationError: the views cannot tell the coefficient or the pin-hole.
         InputError: a setting is none.
     """
+    lens = "division" if lens == "auto" else lens
     used = with_usable_views(detections)
     middle, unit = 0.5 * (np.array(used.image_size) - 1.0), 0.5 * float(np.hypot(*used.image_size))
     value = division_of_grids(grid_views(used), used.image_size)
@@ -57,7 +58,7 @@ def fitzgibbon(detections: Detections, *, lens: str = "auto", skew: bool = False
         used,
         straightened,
         middle,
-        lens="division" if lens == "auto" else lens,
+        lens=lens,
         method="fitzgibbon",
         settings={"lens": lens, "skew": skew},
         said=(CENTRE_TAKEN,),

@@ -37,6 +37,7 @@ def hartley_kang(detections: Detections, *, lens: str = "pfet", skew: bool = Fal
         CalibrationError: the views cannot tell centre, curve or pin-hole.
         InputError: a setting is none.
     """
+    lens = "pfet" if lens == "auto" else lens
     used = with_usable_views(detections)
     views = grid_views(used)
     curve = curve_of_views(views, centre_of_distortion(views, used.image_size))
