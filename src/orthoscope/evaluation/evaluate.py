@@ -34,6 +34,7 @@ from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
+from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import check_settings
 from orthoscope.methods.decoupled.fits import fits_of
 from orthoscope.models.camera import Camera
@@ -87,6 +88,11 @@ class Evaluation:
     groups: Groups | None = None
     situation: Situation = NOTHING_KNOWN
     folds: int = 0
+
+    def __repr__(self) -> str:
+        held_out = with_error(self.held_out_rms_px, self.held_out_error_px)
+        told = f"{self.verdict.grade}, rms {self.rms_px:.3g} px, held out {held_out} px"
+        return f"Evaluation({told})\n  {self.verdict}"
 
     def trusted(self, pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
         """Which places of the image lie where the camera may be used; none where nothing tells how far off it

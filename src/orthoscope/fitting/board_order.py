@@ -33,7 +33,7 @@ from orthoscope.targets.target import Target
 __all__ = ["Turn", "in_one_order", "listed_as_known", "turns_of"]
 
 # At least so many views are needed: of two, either may be the one that is turned.
-FEWEST_VIEWS = 3
+FEWEST_ORDERED_VIEWS = 3
 # A smooth shape's coefficients have a standard deviation of this share of the target's size.
 LIKELY_SHARE = 1e-3
 # Chance gives no gain of this many times the noise's variance for each view that is turned.
@@ -89,7 +89,11 @@ def in_one_order(flat: Calibration) -> Calibration:
     poses turn with them.
     """
     turns = turns_of(flat.detections.target)
-    if len(turns) < 2 or len(flat.detections.views) < FEWEST_VIEWS or flat.camera.lens_frame is not None:
+    if (
+        len(turns) < 2
+        or len(flat.detections.views) < FEWEST_ORDERED_VIEWS
+        or flat.camera.lens_frame is not None
+    ):
         return flat
     chosen = _chosen(_Sums.of(flat, turns))
     if not chosen.any():

@@ -29,7 +29,7 @@ from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
 
-__all__ = ["Linearised", "ResidualSlopes", "SharedInverse"]
+__all__ = ["ROUNDING_SHARE", "Linearised", "ResidualSlopes", "SharedInverse"]
 
 # This is added to a scaled system's diagonal before it is inverted.
 ROUNDING_SHARE = 1e-13

@@ -64,7 +64,7 @@ from orthoscope.models.difference import image_difference
 __all__ = ["LensMisfit", "Misfit", "MisfitTest", "TargetMisfit", "misfit"]
 
 # The image has about so many cells: finer than any lens varies, coarse enough for some corners in each.
-CELL_COUNT = 48
+MISFIT_CELLS = 48
 # The target has about so many patches: each corner is one, but where there are more corners.
 PATCH_COUNT = 300
 # The block with this number is tested for the target.
@@ -124,7 +124,7 @@ def misfit(calibration: Calibration) -> Misfit:
     residuals.
     """
     detections = calibration.detections
-    cells, patches = cells_for(detections.image_size, CELL_COUNT), _patches(detections.target.points)
+    cells, patches = cells_for(detections.image_size, MISFIT_CELLS), _patches(detections.target.points)
     slopes = slopes_of(calibration)
     weight = _weights(slopes.residual)[:, None, None]
     smooth_terms = _smooth_terms(calibration.camera, slopes.pixels + slopes.residual)
