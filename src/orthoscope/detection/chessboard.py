@@ -51,7 +51,7 @@ LEAST_EXPLAINED = 0.9
 # Boards with smaller steps, pixels, are treated as a poor picture's.
 SMALL_STEP = 12.0
 # A part of a board has at least this many corners.
-FEWEST_CORNERS = 6
+FEWEST_PART_CORNERS = 6
 # At least this share of the board's corners hangs together, or trying other finders is not worth while.
 ENOUGH_CORNERS_SHARE = 0.25
 # More than this many times the board's corners are a tiled floor, not a board.
@@ -104,7 +104,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         if sight and len(sight.ids) == board.columns * board.rows:
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in others)
             return sight._replace(remark=TWICE) if alike else sight
-        parts += [sight] if sight and len(sight.ids) >= FEWEST_CORNERS else []
+        parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: len(sight.ids), default=None)
     count = board.columns * board.rows
     if ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count and (
@@ -120,7 +120,7 @@ def _in_photograph(
     grey: ndarray, copy: ndarray, found: CornerLattice, board: Chessboard | MarkedChessboard
 ) -> Grid | None:
     """The grid of a copy's lattice, in the photograph's pixels; None where nothing is left of it."""
-    grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_CORNERS else None
+    grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_PART_CORNERS else None
     if grid is None or not has_plain_squares(copy, grid):
         return None
     return grid._replace(corners=to_photograph(grid.corners, copy, grey))

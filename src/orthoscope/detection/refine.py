@@ -41,7 +41,7 @@ SADDLE_MEAN_SQUARE = 0.6
 # A fit that ends farther from its start than this share of a square is not believed.
 FARTHEST_SHARE = 0.35
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
-LEAST_EXPLAINED_SHARE = 0.85
+LEAST_SADDLE_SHARE = 0.85
 
 
 # So many pixels, evenly picked, tell the noise.
@@ -92,7 +92,7 @@ def refined(
     )
     allowed = np.maximum(FARTHEST_SHARE * nearest_neighbour(near, places), 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
-    least = LEAST_EXPLAINED_SHARE * signal / np.maximum(signal + _noise(small) * NOISE_LEFT_SHARE, 1e-9)
+    least = LEAST_SADDLE_SHARE * signal / np.maximum(signal + _noise(small) * NOISE_LEFT_SHARE, 1e-9)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     return Refined(pixels, believed, saddles.explained)

@@ -32,6 +32,8 @@ TOLERANCE_SHARE = 1e-5
 ITERATION_LIMIT = 200
 # Where a residual is this many times the fit's own, the others do not tell where this view's corners are.
 HOPELESS_RATIO = 1e3
+# So many views are looked at together, for what is between to take no more room than it has to.
+VIEWS_AT_ONCE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +88,14 @@ def scattered(changes: Float[ndarray, "m d"]) -> Float[ndarray, "m d"]:
 
 def hat_of(fit: Linearised, rows: Float[ndarray, "m n c"]) -> Float[ndarray, "m n c"]:
     """B_j times rows of each view: the part of the view's residual that its own say in the fit explains."""
-    return fit.moves(fit.solved(fit.pulls(rows)))
+    if fit.views <= VIEWS_AT_ONCE:
+        return fit.moves(fit.solved(fit.pulls(rows)))
+    found = np.empty_like(rows)
+    for start in range(0, fit.views, VIEWS_AT_ONCE):
+        some = slice(start, start + VIEWS_AT_ONCE)
+        part = fit.only(some)
+        found[some] = part.moves(part.solved(part.pulls(rows[some])))
+    return found
 
 
 def _without_themselves(fit: Linearised, e: Float[ndarray, "m n"]) -> tuple[Float[ndarray, "m n"], ndarray]:

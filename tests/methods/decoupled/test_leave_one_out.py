@@ -104,3 +104,13 @@ def test_the_order_of_the_views_does_not_matter(photographs: Detections):
         leave_one_out(linearised(fitted(some, "smooth", "formula"))) for some in (photographs, backwards)
     )
     assert_allclose(forth.squares, back.squares[::-1], rtol=1e-5)
+
+
+def test_views_looked_at_together_or_in_parts_say_the_same(
+    fit: tuple[StepOneFit, Linearised], monkeypatch: pytest.MonkeyPatch
+):
+    known = fit[1]
+    rows = np.random.default_rng(2).standard_normal((*known.residual.shape, 2)) * (known.root > 0)[..., None]
+    together = hat_of(known, rows)
+    monkeypatch.setattr("orthoscope.fitting.leave_one_out.VIEWS_AT_ONCE", 3)
+    assert_allclose(hat_of(known, rows), together, rtol=1e-9, atol=1e-9)

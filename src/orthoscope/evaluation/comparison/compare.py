@@ -27,6 +27,7 @@ from orthoscope.fitting.held_out import FEWEST_VIEWS, USUAL_FOLDS, folds_of_view
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
+from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import METHODS, calibrate
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.camera import Camera
@@ -87,6 +88,13 @@ class Comparison:
     detections: Detections
     folds: int
     standings: tuple[Standing, ...]
+
+    def __repr__(self) -> str:
+        told = (
+            f"\n  {each.entry.name}: {each.failure or with_error(each.held_out_px, each.error_px) + ' px'}"
+            for each in self.standings
+        )
+        return f"Comparison({len(self.standings)} entries, held out on {self.detections!r}){''.join(told)}"
 
     @property
     def judged(self) -> tuple[Standing, ...]:

@@ -115,8 +115,8 @@ def distinct_views(detections: Detections) -> int:
         sampled = np.hypot(*np.moveaxis(kept[:count, some] - table[some], -1, 0))
         likely = np.flatnonzero((sampled < near).any(1) | np.isnan(sampled).all(1))
         gaps = np.hypot(*np.moveaxis(kept[likely] - table, -1, 0))
-        gaps = gaps[np.isfinite(gaps).sum(1) >= 4]
-        if not len(gaps) or not (np.nanmedian(gaps, axis=1) < near).any():
+        common = np.isfinite(gaps).sum(1)
+        if not ((common >= 4) & ((gaps < near).sum(1) > 0.5 * common)).any():
             kept[count] = table
             count += 1
     return count

@@ -9,7 +9,7 @@ no photograph is foreseen by so few others that another choice would have been r
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -43,8 +43,12 @@ class Candidates:
         self.detections, self._skew = detections, skew
         self._fitter = fitter or Kept(detections, skew=skew)
         self.flat, self.step_one = cache(self._fitter.flat), cache(self._fitter.step_one)
-        self.linearised, self.left_out = cache(self._linearised), cache(self._left_out)
+        # Large, of many views; what is asked for of one model is asked for together.
+        self.linearised, self.left_out = (
+            lru_cache(maxsize=1)(make) for make in (self._linearised, self._left_out)
+        )
         self.from_pairs, self.scatter = cache(self._from_pairs), cache(self._scatter)
+        self.residuals = cache(self._residuals)
 
     def contender(self, model: Model) -> Contender:
         """The model with its squared held-out residuals; NaN in views where the others cannot tell, or in all
@@ -56,7 +60,7 @@ class Candidates:
             squares = np.full(len(self.detections.views), np.nan)
         return Contender(model.base, model.shape, model.lens, model.fit, squares)
 
-    def residuals(self, model: Model) -> Float[ndarray, "m n"]:
+    def _residuals(self, model: Model) -> Float[ndarray, "m n"]:
         """Of each view by the model without it, as in `LeaveOneOut`.
 
         Raises:
