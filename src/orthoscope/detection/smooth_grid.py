@@ -20,9 +20,9 @@ __all__ = ["off_smooth_grid"]
 TIMES_USUAL = 8.0
 # And by at least so many pixels, or this share of a step.
 LEAST_PX, LEAST_STEP_SHARE = 0.6, 0.01
-# In a poor picture, whose noise makes the residuals, they are off beyond so many times the usual one,
+# In a poor picture, whose noise makes the residuals, they are off beyond so many times the usual one.
 TIMES_NOISE = 3.2
-# and, whatever is usual, beyond so many pixels or this share of a step.
+# There they are off, whatever is usual, beyond so many pixels or this share of a step.
 MOST_PX, MOST_STEP_SHARE = 0.6, 0.03
 # The residual of a doubtful corner counts so many times.
 DOUBTFUL_TIMES = 2.0
