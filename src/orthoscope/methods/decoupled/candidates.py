@@ -16,6 +16,7 @@ import numpy as np
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.near_copies import near_copies
 from orthoscope.fitting.scatter import Scatter, scatter_of
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.fitters import Fitter, Kept
@@ -41,6 +42,7 @@ class Candidates:
 
     def __init__(self, detections: Detections, *, skew: bool, fitter: Fitter | None = None) -> None:
         self.detections, self._skew = detections, skew
+        self._photographs = near_copies(detections)
         self._fitter = fitter or Kept(detections, skew=skew)
         self.flat, self.step_one = cache(self._fitter.flat), cache(self._fitter.step_one)
         # Large, of many views; what is asked for of one model is asked for together.
@@ -94,7 +96,7 @@ class Candidates:
         return linearised(self.step_one(model))
 
     def _left_out(self, model: Model) -> LeaveOneOut:
-        return leave_one_out(self.linearised(model))
+        return leave_one_out(self.linearised(model), self._photographs)
 
     def _scatter(self, model: Model) -> Scatter:
         """How the model's camera scatters."""
