@@ -14,6 +14,7 @@ import orthoscope
 from helpers.scenes import NARROW, camera_with, photographed
 from orthoscope.methods import settings, settings_of
 from orthoscope.models.lenses import LENSES, Brown
+from orthoscope.simulation.render import rendered_photographs
 
 SOURCE = Path(orthoscope.__file__).parent
 LONGEST = 400  # characters of a repr: a few lines of a notebook
@@ -92,3 +93,47 @@ def test_matrix_and_distortion_are_a_line_each(calibration):
 def test_editors_know_the_settings_that_a_method_has(method):
     told = getattr(settings, "".join(map(str.capitalize, method.split("_"))) + "Settings")
     assert list(told.__annotations__) == settings_of(method)
+
+
+# What somebody writes on the first day, with `photographs`, a list of pictures, and `rig.yaml` of ROS.
+FIRST_DAY = """
+import numpy as np
+import orthoscope
+
+x, y = np.meshgrid(np.arange(7), np.arange(5))
+points = 0.03 * np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+target = orthoscope.Target("my board", points, grid=(7, 5))
+detections = orthoscope.detect(photographs, target)
+calibration = orthoscope.calibrate(detections)
+camera = calibration.camera
+print(target, detections, calibration, camera, calibration.uncertainty)
+print(orthoscope.evaluate(calibration))
+print(camera.K)
+print(camera.project([0, 0, 1]), camera.unproject([[160, 120]]))
+exported = orthoscope.export(calibration, "camera.yml", "opencv")
+K, dist = orthoscope.load_camera("camera.yml").opencv()
+print(K, dist, *exported.remarks())
+orthoscope.save(calibration, "calibration.json")
+ros = orthoscope.load_camera("rig.yaml")
+straight = orthoscope.undistort(photographs[0], ros)
+"""
+
+
+def test_the_script_of_the_first_day_runs(tmp_path, monkeypatch, capsys):
+    board = orthoscope.chessboard(7, 5, 0.03)
+    truth = orthoscope.Camera((320, 240), orthoscope.Intrinsics(260.0, 260.0, 161.0, 118.0), Brown(k1=-0.2))
+    rng = np.random.default_rng(1)
+    poses = orthoscope.random_views(truth, board, 6, rng=rng, fill=(0.5, 0.9))
+    scene = orthoscope.Scene(truth, board, poses)
+    monkeypatch.chdir(tmp_path)
+    orthoscope.export(truth, "rig.yaml", "ros")
+    found = {"photographs": [image for _, image in rendered_photographs(scene, rng=rng)]}
+    exec(FIRST_DAY, found)
+    told = capsys.readouterr().out
+    assert len(told.splitlines()) < 40
+    assert len(found["detections"].views) == 6
+    assert_allclose(found["K"][[0, 1], [0, 1]], 260.0, rtol=0.02)
+    assert found["dist"][0] < -0.1
+    assert found["straight"].shape == (240, 320)
+    assert_allclose(found["ros"].project([[0.1, 0.1, 1.0]]), truth.project([[0.1, 0.1, 1.0]]), atol=1e-9)
+    assert orthoscope.load_calibration("calibration.json").camera.K.tolist() == found["camera"].K.tolist()

@@ -1,4 +1,4 @@
-"""One word a thing: no public name has two meanings, and docstrings name what is there."""
+"""One word a thing: public names have one meaning, docstrings name what is there, constants say it whole."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -96,6 +97,42 @@ def faults_of(docstring: str, node: Definition) -> list[str]:
     if headings != sorted(headings, key=SECTIONS.index):
         faults.append(f"the sections stand as {', '.join(headings)}")
     return faults
+
+
+def half_said(source: str) -> list[str]:
+    """Constants of a module whose comment is no whole sentence of its own in the lines above, with these."""
+    lines = source.splitlines()
+    found = []
+    for node in ast.parse(source).body:
+        if not isinstance(node, ast.Assign | ast.AnnAssign):
+            continue
+        target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
+        names = [one.id for one in ast.walk(target) if isinstance(one, ast.Name)]
+        if not all(name.isupper() for name in names):
+            continue
+        first = node.lineno - 1
+        above = list(takewhile(lambda line: line.startswith("# "), reversed(lines[:first])))
+        said = " ".join(line[2:] for line in reversed(above))
+        behind = re.search(r"  # (?!fmt|noqa|pyright|type)", lines[first])
+        if behind or (said and (said[0].islower() or said[-1] not in ".:)")):
+            found.append(f"{', '.join(names)}: {said or lines[first]}")
+    return found
+
+
+def test_the_comment_of_a_constant_is_a_sentence_of_its_own():
+    found = [
+        f"{path}: {one}" for path in sorted(PACKAGE.rglob("*.py")) for one in half_said(path.read_text())
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    "comment",
+    ["STEPS = 3  # of each stage", "# of each stage, at most\nSTEPS = 3", "# Each has so many,\nSTEPS = 3"],
+)
+def test_half_a_sentence_at_a_constant_is_seen(comment):
+    assert len(half_said(comment)) == 1
+    assert half_said("# Each stage has at most so many steps.\nSTEPS = 3") == []
 
 
 def test_no_public_name_is_defined_twice():

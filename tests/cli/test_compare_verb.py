@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orthoscope.cli.compare import compare
 from orthoscope.evaluation.comparison.entry import USUAL
+from orthoscope.fitting.held_out import USUAL_FOLDS
 from orthoscope.formats.own.json import load, load_detections, save
 
 FILES = {"comparison.json", "comparison.html", "comparison.svg"}
@@ -139,3 +141,7 @@ def test_left_alone_it_compares_every_method_in_two_processes_on_photographs(run
     numbers = json.loads(told.out)
     assert {entry["name"] for entry in numbers["standings"]} == set(USUAL)
     assert all(entry["held_out_px"] for entry in numbers["standings"])
+
+
+def test_its_folds_are_the_usual_ones():
+    assert {option.name: option.default for option in compare.params}["folds"] == USUAL_FOLDS

@@ -25,7 +25,7 @@ FISHEYE = Camera((800, 600), Intrinsics(330.0, 330.0, 400.0, 300.0), KannalaBran
 BROWNS, FISHEYES = Renderer(BROWN), Renderer(FISHEYE)  # a renderer keeps its camera's rays
 MOST_OFF = 1.0  # px: a corner farther from the truth is another corner
 FOUND = (
-    0.93  # of the corners around which a whole step is in the picture; all but a few at the rim of a fisheye
+    0.95  # of the corners around which a whole step is in the picture; all but a few at the rim of a fisheye
 )
 
 

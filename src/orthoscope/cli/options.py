@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    from orthoscope.models.camera import Camera
 
 __all__ = [
     "another_size",
@@ -39,6 +42,8 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 class _Size(click.ParamType):
+    """An image's width and height, pixels."""
+
     name = "WxH"
 
     def convert(
@@ -78,32 +83,30 @@ class _Tool(click.ParamType):
 
 
 class _Crop(click.ParamType):
+    """A part of an image: where it begins, and its size."""
+
     name = "WxH+X+Y"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        found = re.fullmatch(r"(\d{1,7})x(\d{1,7})\+(\d{1,7})\+(\d{1,7})", str(value))
-        if isinstance(value, tuple) or not found:
-            return (
-                value
-                if isinstance(value, tuple)
-                else self.fail(
-                    f"{value!r} is no part of an image; expected WIDTHxHEIGHT+LEFT+TOP, such as 640x480+320+240.",
-                    param,
-                    ctx,
-                )
+        if isinstance(value, tuple):
+            return value
+        found = re.fullmatch(r"(\d{1,7})x(\d{1,7})\+(\d{1,7})\+(\d{1,7})", value)
+        if not found:
+            self.fail(
+                f"{value!r} is no part of an image; expected WIDTHxHEIGHT+LEFT+TOP, such as 640x480+320+240.",
+                param,
+                ctx,
             )
         width, height, left, top = (int(part) for part in found.groups())
         return left, top, (width, height)
 
 
-TOOL = _Tool()
+SIZE, TOOL = _Size(), _Tool()
 
 
 def another_size(verb: Callable[..., Any]) -> Callable[..., Any]:
     """--crop, --binning and --resize: the same camera for photographs of another size, done in this order."""
-    resize = click.option(
-        "--resize", type=_Size(), help="The same camera for photographs scaled to this size."
-    )
+    resize = click.option("--resize", type=SIZE, help="The same camera for photographs scaled to this size.")
     binning = click.option(
         "--binning",
         type=click.IntRange(1),
@@ -118,9 +121,20 @@ def another_size(verb: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def camera_at_another_size(
-    camera: Any, crop: Any, binning: int | None, resize: tuple[int, int] | None
-) -> Any:
-    """The camera cropped, binned and resized as `another_size` was told."""
+    camera: Camera,
+    *,
+    crop: tuple[int, int, tuple[int, int]] | None,
+    binning: int | None,
+    resize: tuple[int, int] | None,
+) -> Camera:
+    """The same camera for photographs of another size, done in this order.
+
+    Args:
+        camera: for the photographs as they were.
+        crop: the part's left column, its top row and its size; None for the whole.
+        binning: side of a block of pixels that are read as one; None for 1.
+        resize: width and height of the scaled photographs; None where they are not scaled.
+    """
     camera = camera.cropped(*crop) if crop else camera
     camera = camera.binned(binning) if binning else camera
     return camera.resized(resize) if resize else camera
@@ -137,7 +151,6 @@ def tool_settings(verb: Callable[..., Any]) -> Callable[..., Any]:
     return name(anyway(verb))
 
 
-SIZE = _Size()
 photos: Decorator = click.argument("photos", nargs=-1, required=True, metavar="PHOTOS...")
 target: Decorator = click.option(
     "--target",
@@ -153,7 +166,7 @@ target: Decorator = click.option(
 )
 image_size: Decorator = click.option(
     "--image-size",
-    type=_Size(),
+    type=SIZE,
     help="Size of the photographs; needed with a corners.vnl table or a simulated lens only.",
 )
 lens: Decorator = click.option(

@@ -20,13 +20,22 @@ import numpy as np
 
 from orthoscope.detection.board_marks import ways_by_marks
 from orthoscope.detection.copies import resized, to_photograph
-from orthoscope.detection.grid import cross, grid_shape
+from orthoscope.detection.grid import cross, grid_shape, nearest_neighbour
 from orthoscope.detection.lattices import CornerLattice, lattices
 from orthoscope.detection.opencv_finders import opencv_boards
-from orthoscope.detection.partial_board import Grid, filled, grid_of, laid_out, placements
+from orthoscope.detection.partial_board import (
+    Grid,
+    filled,
+    grid_of,
+    has_plain_squares,
+    is_even,
+    laid_out,
+    placements,
+)
 from orthoscope.detection.refine import Refined, refined
 from orthoscope.detection.saddle_points import saddle_points
 from orthoscope.detection.sight import TWICE, Sight, Unseen
+from orthoscope.detection.smooth_grid import off_smooth_grid
 from orthoscope.geometry.arrays import Bool, Float, InputError, Int, ndarray
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.marked_chessboard import MarkedChessboard
@@ -37,8 +46,12 @@ __all__ = ["board_size", "find_chessboard", "see_chessboard"]
 COPY_SIDES = (640, 320, 1280, 2560)
 # So many lattices of each copy are looked at, since a chequered shirt may be larger than the board.
 LATTICES_PER_COPY = 2
+# In a poor picture saddles usually explain less of their windows than this.
+LEAST_EXPLAINED = 0.9
+# Boards with smaller steps, pixels, are treated as a poor picture's.
+SMALL_STEP = 12.0
 # A part of a board has at least this many corners.
-FEWEST_CORNERS = 6
+FEWEST_PART_CORNERS = 6
 # At least this share of the board's corners hangs together, or trying other finders is not worth while.
 ENOUGH_CORNERS_SHARE = 0.25
 # More than this many times the board's corners are a tiled floor, not a board.
@@ -79,18 +92,19 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         )
     parts, hanging, open_ = [], 0, False
     for found, copy, others in _hanging_together(grey):
-        hanging = max(hanging, len(found.pixels))
-        if hanging > FLOOR_RATIO * board.columns * board.rows:
+        if len(found.pixels) > FLOOR_RATIO * board.columns * board.rows:
             break
         grid = _in_photograph(grey, copy, found, board)
         if grid is None:
             continue
+        if is_even(grey, grid):
+            hanging = max(hanging, int(grid.seen.sum()))
         sight = _on_board(grey, grid, board)
         open_ |= sight is None
         if sight and len(sight.ids) == board.columns * board.rows:
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in others)
             return sight._replace(remark=TWICE) if alike else sight
-        parts += [sight] if sight and len(sight.ids) >= FEWEST_CORNERS else []
+        parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: len(sight.ids), default=None)
     count = board.columns * board.rows
     if ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count and (
@@ -106,8 +120,10 @@ def _in_photograph(
     grey: ndarray, copy: ndarray, found: CornerLattice, board: Chessboard | MarkedChessboard
 ) -> Grid | None:
     """The grid of a copy's lattice, in the photograph's pixels; None where nothing is left of it."""
-    grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_CORNERS else None
-    return grid and grid._replace(corners=to_photograph(grid.corners, copy, grey))
+    grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_PART_CORNERS else None
+    if grid is None or not has_plain_squares(copy, grid):
+        return None
+    return grid._replace(corners=to_photograph(grid.corners, copy, grey))
 
 
 def _is_whole(grid: Grid | None, board: Chessboard | MarkedChessboard) -> bool:
@@ -131,7 +147,7 @@ def board_size(grey: ndarray, *, whole: bool = True) -> tuple[int, int] | None:
         grey: (h,w) uint8.
         whole: whether all four of its sides must be seen; else one will do.
     """
-    for found, copy, _ in _hanging_together(grey):
+    for found, copy, *_ in _hanging_together(grey):
         grid = laid_out(copy, found, max(found.size))
         if grid and (all if whole else any)(grid.ends) and min(grid.seen.shape) > 2:
             rows, columns = sorted(grid.seen.shape)
@@ -216,9 +232,12 @@ def _refined(
         start = np.where(off[:, None], filled(known)[row, column], fine.pixels)
         again = refined(grey, start, places, approach=False, arm=arms[row, column])
         fine = Refined(
-            np.where(off[:, None], again.pixels, fine.pixels), np.where(off, again.believed, fine.believed)
+            np.where(off[:, None], again.pixels, fine.pixels),
+            np.where(off, again.believed, fine.believed),
+            np.where(off, again.explained, fine.explained),
         )
         off = _off(fine, places)
+    fine, off = _on_smooth_grid(grey, fine, places, off, arms[row, column])
     good = np.zeros_like(seen)
     good[row, column] = ~off & (seen[row, column] | fine.believed)
     if not good.all() and (~fine.believed[good[row, column]]).mean() > MOST_DOUBTFUL_SHARE:
@@ -226,6 +245,35 @@ def _refined(
     pixels = corners.copy()
     pixels[row, column] = fine.pixels
     return pixels, good
+
+
+def _on_smooth_grid(
+    grey: ndarray,
+    fine: Refined,
+    places: Float[ndarray, "m 2"],
+    off: Bool[ndarray, " m"],
+    arms: Float[ndarray, " m"],
+) -> tuple[Refined, Bool[ndarray, " m"]]:
+    """The corners, those that are off where all others foresee them sought again from there; and which stay
+    off.
+    """
+    on = np.flatnonzero(~off)
+    if not len(on):
+        return fine, off
+    step = float(np.median(nearest_neighbour(fine.pixels[on], places[on])))
+    poor = float(np.median(fine.explained[on])) < LEAST_EXPLAINED or step < SMALL_STEP
+    away, foreseen, limit = off_smooth_grid(
+        fine.pixels[on], places[on], step, doubtful=~fine.believed[on], poor=poor
+    )
+    if not away.any():
+        return fine, off
+    pixels, believed, off = fine.pixels.copy(), fine.believed.copy(), off.copy()
+    pixels[on[away]] = foreseen[away]
+    again = refined(grey, pixels[on], places[on], approach=False, arm=arms[on])
+    pixels[on[away]], believed[on[away]] = again.pixels[away], again.believed[away]
+    moved = np.hypot(*(again.pixels - foreseen).T)
+    off[on[away]] = ((moved > limit) | ~again.believed)[away]
+    return Refined(pixels, believed, fine.explained), off
 
 
 def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:

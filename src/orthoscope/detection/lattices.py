@@ -21,11 +21,11 @@ __all__ = ["CornerLattice", "lattices"]
 # So many of the nearest corners may be neighbours.
 NEIGHBOUR_CANDIDATES = 16
 # The edge is off the direction to the neighbour, and off the neighbour's edge, by less than this, radians.
-WIDEST_ANGLE = np.deg2rad(22.0)
+WIDEST_TURN = np.deg2rad(22.0)
 # The second step in one direction is at most so many times the first, and the other way round.
 MOST_STEP_RATIO = 2.5
 # A lattice worth telling of has at least this many corners.
-FEWEST_CORNERS = 4
+FEWEST_LATTICE_CORNERS = 4
 
 
 class CornerLattice(NamedTuple):
@@ -50,7 +50,7 @@ class CornerLattice(NamedTuple):
 
 def lattices(points: SaddlePoints) -> list[CornerLattice]:
     """What hangs together, the most corners first."""
-    if len(points.pixels) < FEWEST_CORNERS:
+    if len(points.pixels) < FEWEST_LATTICE_CORNERS:
         return []
     links = _mutual(_neighbours(points))
     left = np.ones(len(links), dtype=bool)
@@ -59,7 +59,7 @@ def lattices(points: SaddlePoints) -> list[CornerLattice]:
         if left[seed] and (links[seed] >= 0).sum() >= 2:
             members, cells = _spread(links, points.edges, int(seed), left)
             left[members] = False
-            if len(members) >= FEWEST_CORNERS:
+            if len(members) >= FEWEST_LATTICE_CORNERS:
                 found.append(_lattice(points, members, cells))
     return sorted(found, key=lambda lattice: -len(lattice.pixels))
 
@@ -78,12 +78,12 @@ def _neighbours(points: SaddlePoints) -> Int[ndarray, "n 4"]:
     far = np.hypot(step[..., 0], step[..., 1])
     heading = np.arctan2(step[..., 1], step[..., 0])
     swapped = points.edges[near][..., ::-1]
-    alike = (_between(swapped, points.edges[:, None]) < WIDEST_ANGLE).all(-1)
+    alike = (_between(swapped, points.edges[:, None]) < WIDEST_TURN).all(-1)
     links = np.full((count, 4), -1)
     for way in range(4):
         edge = points.edges[:, way % 2] + (np.pi if way > 1 else 0.0)
         off = np.abs((heading - edge[:, None] + np.pi) % (2 * np.pi) - np.pi)
-        length = np.where(alike & (off < WIDEST_ANGLE), far * (1.0 + off), np.inf)
+        length = np.where(alike & (off < WIDEST_TURN), far * (1.0 + off), np.inf)
         best = length.argmin(1)
         rows = np.arange(count)
         links[:, way] = np.where(np.isfinite(length[rows, best]), near[rows, best], -1)

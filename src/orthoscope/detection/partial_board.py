@@ -16,13 +16,23 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from orthoscope.detection.grid import grid_shape, lattice, one_line_more
 from orthoscope.detection.lattices import CornerLattice
 from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 
-__all__ = ["Grid", "alternating", "filled", "grid_of", "laid_out", "placements"]
+__all__ = [
+    "Grid",
+    "alternating",
+    "filled",
+    "grid_of",
+    "has_plain_squares",
+    "is_even",
+    "laid_out",
+    "placements",
+]
 
 # A corner strays from the parabolas of its row and column by at most this share of a step.
 FARTHEST_STRAY_SHARE = 0.3
@@ -40,6 +50,14 @@ GOING_ON_SHARE = 0.6
 BLANK_SQUARES_SHARE = 0.75
 # A line at the rim with fewer than three corners, and less than this share of the next line's, is chance.
 THIN_LINE_SHARE = 0.34
+# Where squares are looked at, as shares of their sides.
+PLACES_IN_SQUARE = (0.3, 0.5, 0.7)
+# The place with the least contrast of bright to dark squares has at least this share of the greatest.
+LEAST_PLAIN_SHARE = 0.37
+# So many lines more are needed for the shape of those.
+SHAPING_LINES = 2
+# The usual difference of corners' strengths from their median is less than this share of it on a board.
+MOST_UNEVENNESS = 0.45
 # A line is compared with so many lines before it.
 COMPARED_LINES = 4
 
@@ -224,9 +242,43 @@ def _taken_further(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool, mo
     return Grid(grid, seen, bright, (top, right, bottom, left))
 
 
+def is_even(grey: ndarray, grid: Grid) -> bool:
+    """Whether a grid's corners are about as strong as each other; those of texture are not."""
+    strength = alternating(grey, grid.corners)[grid.seen] * (1.0 if grid.bright else -1.0)
+    usual = float(np.median(strength)) if len(strength) else 0.0
+    return usual > 0 and float(np.median(np.abs(strength - usual))) < MOST_UNEVENNESS * usual
+
+
+def has_plain_squares(grey: ndarray, grid: Grid) -> bool:
+    """Whether a grid's squares are bright and dark by turns all over, in the mean of each of nine places in
+    them.
+
+    Where a board is seen small and slanted a lattice may link every other corner, or middles of squares: its
+    own squares are then parts of several.
+    """
+    corners = grid.corners
+    rows, columns = grid.seen.shape[0] - 1, grid.seen.shape[1] - 1
+    bright = (np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0) == grid.bright
+    if bright.all() or not bright.any():
+        return True
+    u, v = (part.reshape(-1, 1, 1, 1) for part in np.meshgrid(PLACES_IN_SQUARE, PLACES_IN_SQUARE))
+    places = (1 - v) * ((1 - u) * corners[:-1, :-1] + u * corners[:-1, 1:])
+    places += v * ((1 - u) * corners[1:, :-1] + u * corners[1:, 1:])
+    low = np.maximum(np.floor(places.reshape(-1, 2).min(0)) - 4, 0).astype(int)
+    high = np.maximum(np.ceil(places.reshape(-1, 2).max(0)) + 5, low + 1).astype(int)
+    part = cv2.GaussianBlur(grey[low[1] : high[1], low[0] : high[0]], (0, 0), 1.0)
+    if not part.size:
+        return False
+    x, y = (places - low).reshape(len(places), -1, 2).astype(np.float32).transpose(2, 0, 1)
+    values = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
+    contrast = values[:, bright.ravel()].mean(1) - values[:, ~bright.ravel()].mean(1)
+    return bool(contrast.min() > LEAST_PLAIN_SHARE * contrast.max())
+
+
 def _next_line_stands(grey: ndarray, more: ndarray, bright: bool) -> ndarray:
     """Which corners of the last row are the board's, as those of the rows before it are."""
-    strength = alternating(grey, more)[-1 - COMPARED_LINES :] * (1.0 if bright else -1.0)
+    first = max(0, len(more) - 1 - COMPARED_LINES - SHAPING_LINES) // 2 * 2  # even, for the signs
+    strength = alternating(grey, more[first:])[-1 - COMPARED_LINES :] * (1.0 if bright else -1.0)
     before = strength[:-1]
     usual = np.median(before[before > 0]) if (before > 0).any() else np.inf
     return strength[-1] > 0.5 * usual

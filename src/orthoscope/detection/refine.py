@@ -41,16 +41,21 @@ SADDLE_MEAN_SQUARE = 0.6
 # A fit that ends farther from its start than this share of a square is not believed.
 FARTHEST_SHARE = 0.35
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
-LEAST_EXPLAINED_SHARE = 0.85
+LEAST_SADDLE_SHARE = 0.85
+
+
+# So many pixels, evenly picked, tell the noise.
+NOISE_PIXELS = 10_000
 
 
 class Refined(NamedTuple):
     """pixels: (m,2) of the corners.  believed: (m,) whether a saddle was fitted; else cornerSubPix had the
-    last word.
+    last word.  explained: (m,) share of its window's variance that the saddle explains.
     """
 
     pixels: Float[ndarray, "m 2"]
     believed: Bool[ndarray, " m"]
+    explained: Float[ndarray, " m"]
 
 
 def refined(
@@ -87,10 +92,10 @@ def refined(
     )
     allowed = np.maximum(FARTHEST_SHARE * nearest_neighbour(near, places), 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
-    least = LEAST_EXPLAINED_SHARE * signal / np.maximum(signal + _noise(small) * NOISE_LEFT_SHARE, 1e-9)
+    least = LEAST_SADDLE_SHARE * signal / np.maximum(signal + _noise(small) * NOISE_LEFT_SHARE, 1e-9)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
-    return Refined(pixels, believed)
+    return Refined(pixels, believed, saddles.explained)
 
 
 def _surroundings(
@@ -115,6 +120,7 @@ def _reduced(grey: ndarray, shrink: int) -> ndarray:
 def _noise(grey: ndarray) -> float:
     """The variance of a picture's noise, from what differs from pixel to pixel in its even parts."""
     rough = cv2.filter2D(grey, cv2.CV_32F, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32))
+    rough = rough.ravel()[:: max(1, rough.size // NOISE_PIXELS)]
     return float((np.median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)
 
 

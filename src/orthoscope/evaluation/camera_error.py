@@ -43,7 +43,7 @@ MAP_COLUMNS = 28
 # The map has so many rows.
 MAP_ROWS = 21
 # The region is grown in so many directions.
-DIRECTION_COUNT = 48
+REGION_DIRECTIONS = 48
 # The region is grown in so many steps.
 REGION_STEPS = 20
 
@@ -174,7 +174,7 @@ def predicted_error(
     far = _Variances(scatter, richest, places, len(seen), np.inf)
     near = _Variances(scatter, richest, lengths[:, None] * places, len(seen), typical)
     seen_px, model_px, alike_px, views_px, bias_px = far.over(part_seen)
-    along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(DIRECTION_COUNT, REGION_STEPS)
+    along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
     return CameraError(
         seen_px=seen_px,
         frame_px=far.over(part_frame)[0],
@@ -257,7 +257,7 @@ def _cells(width: int, height: int) -> Float[ndarray, "n 2"]:
 
 def _ways(middle: Float[ndarray, " 2"], width: int, height: int) -> Float[ndarray, "directions steps 2"]:
     """Pixels from the middle to the frame's border, in many directions."""
-    angle = 2.0 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
+    angle = 2.0 * np.pi * np.arange(REGION_DIRECTIONS) / REGION_DIRECTIONS
     way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     low, high = np.array([-0.5, -0.5]), np.array([width - 0.5, height - 0.5])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -278,7 +278,7 @@ def _grown(
 
 def _between(seen: Float[ndarray, "s 2"], ways: ndarray) -> Bool[ndarray, "directions steps"]:
     """Whether places lie in the convex hull of the seen ones: no farther out than they in any direction."""
-    angle = 2.0 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
+    angle = 2.0 * np.pi * np.arange(REGION_DIRECTIONS) / REGION_DIRECTIONS
     outwards = np.stack([np.cos(angle), np.sin(angle)])
     return (ways @ outwards <= (seen @ outwards).max(0)).all(-1)
 

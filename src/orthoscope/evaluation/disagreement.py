@@ -42,16 +42,16 @@ __all__ = ["AGREED", "Disagreement", "Wishes", "changes_of", "disagreement", "sp
 # A change of K that counts as 1 is this share of the focal length or of the image's width.
 STEP_SHARE = 0.01
 # An eigenvalue of T_j below this share of the largest is no wish.
-FAINT_SHARE = 1e-3
+FAINT_WISH_SHARE = 1e-3
 # A pattern with a singular value below this, C_j projected out, is one that K makes too.
 LEAST_OWN_SINGULAR_VALUE = 0.3
-# Views do not agree when F2 is above this and p is below SURE_P_VALUE.
+# Views do not agree when F2 is above this and p is below DISAGREEING_P_VALUE.
 LARGE_F2 = 3.0
 # Four tests share the chance, and real boards flex in more ways than the patterns of the null: with 1e-4 one
 # clean real set in ten was blamed.
-SURE_P_VALUE = 1e-6
+DISAGREEING_P_VALUE = 1e-6
 # With fewer views it cannot be told whether they agree.
-FEWEST_VIEWS = 5
+FEWEST_TESTED_VIEWS = 5
 KINDS = {
     "zoom": [0],
     "centre": [1, 2],
@@ -83,7 +83,7 @@ class Wishes(NamedTuple):
     @property
     def certain(self) -> bool:
         """Whether the views surely differ."""
-        return self.f2 > LARGE_F2 and self.p_value < SURE_P_VALUE
+        return self.f2 > LARGE_F2 and self.p_value < DISAGREEING_P_VALUE
 
     @property
     def spread(self) -> Float[ndarray, "c c"]:
@@ -127,7 +127,7 @@ def disagreement(fit: Linearised, detections: Detections) -> Disagreement:
     """
     names, changes = changes_of(fit)
     points, pixels = detections.target.points, np.concatenate([view.pixels for view in detections.views])
-    if fit.views < FEWEST_VIEWS or len(names) < 3:
+    if fit.views < FEWEST_TESTED_VIEWS or len(names) < 3:
         return AGREED
     moves = np.concatenate(
         [fit.moves(changes), fit.without_pose(fit.root[..., None] * _shears(detections))], axis=2
@@ -200,7 +200,7 @@ def _pseudo_inverse(told: Float[ndarray, "m c c"]) -> tuple[Float[ndarray, "m c 
     """T_j^+ and the ranks, faint directions left out; columns are scaled alike in all views first."""
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=1, axis2=2).max(0), 1e-300))
     values, vectors = np.linalg.eigh(told * scale * scale[:, None])
-    strong = values > FAINT_SHARE * max(values.max(), 1e-300)
+    strong = values > FAINT_WISH_SHARE * max(values.max(), 1e-300)
     inverse = (
         vectors * np.where(strong, 1.0 / np.where(strong, values, 1.0), 0.0)[:, None]
     ) @ vectors.transpose(0, 2, 1)

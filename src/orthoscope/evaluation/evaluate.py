@@ -22,17 +22,19 @@ from orthoscope.evaluation.metrics import nce_of
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit, reference_fit
 from orthoscope.evaluation.suspects import ViewError
-from orthoscope.evaluation.unseen_views import USUAL_FOLDS, in_folds, in_turn
+from orthoscope.evaluation.unseen_views import in_folds, in_turn
 from orthoscope.evaluation.verdict.facts import Findings, situation_of
 from orthoscope.evaluation.verdict.situation import NOTHING_KNOWN, Situation
 from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.fits import Fits
+from orthoscope.fitting.held_out import USUAL_FOLDS
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
+from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import check_settings
 from orthoscope.methods.decoupled.fits import fits_of
 from orthoscope.models.camera import Camera
@@ -86,6 +88,11 @@ class Evaluation:
     groups: Groups | None = None
     situation: Situation = NOTHING_KNOWN
     folds: int = 0
+
+    def __repr__(self) -> str:
+        held_out = with_error(self.held_out_rms_px, self.held_out_error_px)
+        told = f"{self.verdict.grade}, rms {self.rms_px:.3g} px, held out {held_out} px"
+        return f"Evaluation({told})\n  {self.verdict}"
 
     def trusted(self, pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
         """Which places of the image lie where the camera may be used; none where nothing tells how far off it
@@ -155,6 +162,7 @@ def evaluate(
         InputError: the calibration's method or a setting is none, or folds are fewer than two.
     """
     check_settings(calibration.method, calibration.settings)
+    misfits = misfit(calibration)  # before the fits, which take as much room
     fits, residuals = fits_of(calibration), calibration.residuals()
     if folds is None and fits.own is not None:
         unseen = in_turn(calibration, fits.own.left_out)
@@ -165,7 +173,7 @@ def evaluate(
         ViewError(view.image, len(view.ids), rms(e), rms(e_unseen))
         for view, e, e_unseen in zip(calibration.detections.views, residuals, unseen.residuals, strict=True)
     )
-    found = _findings(calibration, fits, views)
+    found = _findings(calibration, fits, views, misfits)
     situation = situation_of(found)
     return Evaluation(
         calibration=calibration,
@@ -195,13 +203,15 @@ def examine(calibration: Calibration) -> Findings:
     nothing = float("nan")
     pairs = zip(calibration.detections.views, calibration.residuals(), strict=True)
     views = tuple(ViewError(view.image, len(view.ids), rms(e), nothing) for view, e in pairs)
-    return _findings(calibration, fits_of(calibration), views)
+    return _findings(calibration, fits_of(calibration), views, misfit(calibration))
 
 
-def _findings(calibration: Calibration, fits: Fits, views: tuple[ViewError, ...]) -> Findings:
+def _findings(
+    calibration: Calibration, fits: Fits, views: tuple[ViewError, ...], misfits: Misfit
+) -> Findings:
     reference = reference_fit(calibration, fits)
     differ, groups = _agreement(reference, calibration.detections)
-    return Findings(calibration, views, misfit(calibration), reference, differ, groups)
+    return Findings(calibration, views, misfits, reference, differ, groups)
 
 
 def _agreement(reference: ReferenceFit | None, detections: Detections) -> tuple[Disagreement, Groups | None]:

@@ -49,7 +49,7 @@ CERTAIN_LIKELIHOOD = 0.95
 # The linear step must explain this share of the squared residuals before fits are worth their time.
 LEAST_EXPLAINED_SHARE = 0.3
 # A group has at least this many views: with fewer, none can be left out.
-FEWEST_VIEWS = 4
+FEWEST_GROUP_VIEWS = 4
 # K-means starts from so many groupings that are drawn at random.
 RANDOM_STARTS = 60
 # A grouping is refined so many times.
@@ -103,7 +103,7 @@ def two_groups(
         detections: of the fit.
         base: the formula under the free lens.
     """
-    if found.wishes is None or fit.views < 2 * FEWEST_VIEWS:
+    if found.wishes is None or fit.views < 2 * FEWEST_GROUP_VIEWS:
         return None
     noise = fit.noise * max(1.0, found.wishes.tau)
     groupings = _groupings(_quadratics(fit, noise, ("k1",)))
@@ -137,7 +137,10 @@ def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
     views = len(say.score)
     faint = 1e-9 * np.eye(say.score.shape[1]) * np.trace(say.told.mean(0))
     wishes = -np.linalg.solve(say.told + faint, say.score[..., None])[..., 0]
-    cuts = [[wish > cut for cut in np.sort(wish)[FEWEST_VIEWS - 1 : -FEWEST_VIEWS]] for wish in wishes.T]
+    cuts = [
+        [wish > cut for cut in np.sort(wish)[FEWEST_GROUP_VIEWS - 1 : -FEWEST_GROUP_VIEWS]]
+        for wish in wishes.T
+    ]
     rng = np.random.default_rng(0)
     starts = [rng.random(views) < 0.5 for _ in range(RANDOM_STARTS)] + [
         start for of_wish in cuts for start in of_wish
@@ -147,7 +150,7 @@ def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
     able = {
         (second ^ second[0]).tobytes(): second
         for second in ends
-        if FEWEST_VIEWS <= second.sum() <= views - FEWEST_VIEWS
+        if FEWEST_GROUP_VIEWS <= second.sum() <= views - FEWEST_GROUP_VIEWS
     }
     return sorted(((_value(say, second), second) for second in able.values()), key=lambda entry: entry[0])
 
@@ -186,7 +189,7 @@ def _two_values(say: _Quadratics) -> Groups | None:
     if likely.sum() - _likelihood_of_spread(say) < LEAST_LOG_RATIO:
         return None
     second, sure = share[1] > share[0], share.max(0) > CERTAIN_LIKELIHOOD
-    few = min((sure & second).sum(), (sure & ~second).sum()) < FEWEST_VIEWS
+    few = min((sure & second).sum(), (sure & ~second).sum()) < FEWEST_GROUP_VIEWS
     return None if few else _named(second, sure)
 
 
@@ -209,7 +212,10 @@ def _refined(
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
     for _ in range(REFINING_ROUNDS):
-        if second.tobytes() in seen or not FEWEST_VIEWS <= second.sum() <= len(second) - FEWEST_VIEWS:
+        if (
+            second.tobytes() in seen
+            or not FEWEST_GROUP_VIEWS <= second.sum() <= len(second) - FEWEST_GROUP_VIEWS
+        ):
             break
         seen.add(second.tobytes())
         try:

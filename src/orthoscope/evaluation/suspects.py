@@ -33,7 +33,7 @@ ALONE_FACTOR = 2.0
 # A photograph that stands alone also has more than this many times the typical left-out error.
 GAINED_FACTOR = 1.5
 # With fewer views none of them can be told from the others.
-FEWEST_VIEWS = 5
+FEWEST_TELLING_VIEWS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ def suspects_among(
         points: the target's corners, nominal.
     """
     errors = np.array([view.rms_px for view in views])
-    if len(views) < FEWEST_VIEWS:
+    if len(views) < FEWEST_TELLING_VIEWS:
         return ()
     typical = float(np.median(errors))
     odd = np.flatnonzero(errors > max(SUSPECT_FACTOR * typical, NOTABLE_PX))
@@ -101,7 +101,7 @@ def precious_among(
         within, without: squared error of each view with it and without it, px^2.
     """
     corners = np.array([len(view.ids) for view in detections.views], dtype=float)
-    if len(corners) < FEWEST_VIEWS:
+    if len(corners) < FEWEST_TELLING_VIEWS:
         return ()
     own, foreseen = np.sqrt(within / corners), np.sqrt(without / corners)
     typical = float(np.nanmedian(foreseen))

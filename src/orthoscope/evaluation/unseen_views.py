@@ -22,10 +22,7 @@ from orthoscope.fitting.held_out import FEWEST_VIEWS, held_out, rms_and_error
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods import METHODS
 
-__all__ = ["USUAL_FOLDS", "UnseenViews", "in_folds", "in_turn"]
-
-# A method that leaves no view out by itself is called again without each of so many parts.
-USUAL_FOLDS = 5
+__all__ = ["UnseenViews", "in_folds", "in_turn"]
 
 
 class UnseenViews(NamedTuple):

@@ -27,7 +27,7 @@ STRETCH_FRAMES = 4
 # Copies of this size, pixels, are compared: so small that blur does not show.
 COPY_SIZE = (40, 30)
 # Two frames differ by at least so many grey levels, mean over a small copy.
-LEAST_DIFFERENCE = 2.0
+LEAST_GREY_DIFFERENCE = 2.0
 
 
 class Frame(NamedTuple):
@@ -83,7 +83,7 @@ def _with(kept: list[_Kept], picture: ndarray, seconds: float, stretch: int) -> 
     new = _Kept(Frame(seconds, grey), sharpness, small, stretch)
     same = kept and kept[-1].stretch == stretch
     before = kept[:-1] if same else kept
-    if before and np.abs(before[-1].small - small).mean() < LEAST_DIFFERENCE:
+    if before and np.abs(before[-1].small - small).mean() < LEAST_GREY_DIFFERENCE:
         return kept
     if same and kept[-1].sharpness >= sharpness:
         return kept

@@ -33,13 +33,15 @@ from orthoscope.targets.target import Target
 __all__ = ["Turn", "in_one_order", "listed_as_known", "turns_of"]
 
 # At least so many views are needed: of two, either may be the one that is turned.
-FEWEST_VIEWS = 3
+FEWEST_ORDERED_VIEWS = 3
 # A smooth shape's coefficients have a standard deviation of this share of the target's size.
 LIKELY_SHARE = 1e-3
 # Chance gives no gain of this many times the noise's variance for each view that is turned.
 SURE_GAIN = 10.0
 # So many views, of those that tell most, are taken for the right one in turn.
 START_VIEWS = 24
+# So many views are looked at together, to keep what is between in a core's cache.
+VIEWS_AT_ONCE = 32
 # The turns are improved in at most so many rounds.
 ROUND_LIMIT = 20
 # Points nearer than this share of the target's size are one.
@@ -87,7 +89,11 @@ def in_one_order(flat: Calibration) -> Calibration:
     poses turn with them.
     """
     turns = turns_of(flat.detections.target)
-    if len(turns) < 2 or len(flat.detections.views) < FEWEST_VIEWS or flat.camera.lens_frame is not None:
+    if (
+        len(turns) < 2
+        or len(flat.detections.views) < FEWEST_ORDERED_VIEWS
+        or flat.camera.lens_frame is not None
+    ):
         return flat
     chosen = _chosen(_Sums.of(flat, turns))
     if not chosen.any():
@@ -161,20 +167,26 @@ class _Sums:
         poses = observations.poses_of(flat.camera_from_target)
         slopes, residual = residual_slopes(observations, flat.camera, poses, points, free, moves=True)
         m, p = observations.present.shape
-        pose = np.linalg.qr(slopes.pose.transpose(0, 2, 1))[0]
         smooth = polynomials(points, np.ones(p, dtype=bool))
-        r, k = smooth.shape[1], len(free)
-        y = _without(pose, residual[..., None])
+        r, k, square = smooth.shape[1], len(free), 0.0
         gram, right = np.empty((m, len(turns), k + 3 * r, k + 3 * r)), np.empty((m, len(turns), k + 3 * r))
-        for i, turn in enumerate(turns):
-            shown = smooth[turn.corners][:, None, :, None] * turn.rotation.T[None, :, None, :]  # (p, 3, r, 3)
-            pairs = slopes.corner @ shown.reshape(p, 3, 3 * r)  # (m, p, 2, 3r)
-            rows = np.concatenate([pairs[:, :, 0], pairs[:, :, 1]], axis=1)
-            columns = _without(pose, np.concatenate([slopes.camera.transpose(0, 2, 1), rows], axis=2))
-            gram[:, i] = columns.transpose(0, 2, 1) @ columns
-            right[:, i] = (columns.transpose(0, 2, 1) @ y)[..., 0]
+        shown = [
+            (smooth[turn.corners][:, None, :, None] * turn.rotation.T[None, :, None, :]).reshape(p, 3, 3 * r)
+            for turn in turns
+        ]
+        for start in range(0, m, VIEWS_AT_ONCE):
+            rows = slice(start, start + VIEWS_AT_ONCE)
+            pose = np.linalg.qr(slopes.pose[rows].transpose(0, 2, 1))[0]
+            y = _without(pose, residual[rows, :, None])
+            square += float((y**2).sum())
+            by_camera = _without(pose, slopes.camera[rows].transpose(0, 2, 1))
+            for i, shape in enumerate(shown):
+                pairs = slopes.corner[rows] @ shape  # (v, p, 2, 3r)
+                by_shape = _without(pose, np.concatenate([pairs[:, :, 0], pairs[:, :, 1]], axis=1))
+                columns = np.concatenate([by_camera, by_shape], axis=2)
+                gram[rows, i] = columns.transpose(0, 2, 1) @ columns
+                right[rows, i] = (columns.transpose(0, 2, 1) @ y)[..., 0]
         freedom = 2 * observations.corners - 6 * m - k
-        square = float((y**2).sum())
         size = float(np.ptp(points[:, :2], axis=0).max())
         precision = square / max(freedom, 1) / (LIKELY_SHARE * size) ** 2
         prior = np.diag(np.concatenate([1e-9 * np.diag(gram[:, 0].sum(0))[:k], np.full(3 * r, precision)]))

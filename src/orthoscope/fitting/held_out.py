@@ -23,10 +23,12 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
-__all__ = ["FEWEST_VIEWS", "HeldOut", "folds_of_views", "held_out", "rms_and_error"]
+__all__ = ["FEWEST_VIEWS", "USUAL_FOLDS", "HeldOut", "folds_of_views", "held_out", "rms_and_error"]
 
 # With fewer views a fold would leave a calibration that rests on assumptions.
 FEWEST_VIEWS = 4
+# Views are held out in so many parts where nobody says in how many.
+USUAL_FOLDS = 5
 
 Refit = Callable[[Detections], Calibration]
 
@@ -103,7 +105,7 @@ def held_out(
     detections: Detections,
     refit: Refit,
     *,
-    folds: int = 5,
+    folds: int = USUAL_FOLDS,
     seed: int = 0,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,

@@ -20,9 +20,9 @@ from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import Solution
 from orthoscope.targets.detections import Detections
 
-__all__ = ["check_enough", "check_known", "told"]
+__all__ = ["LEAST_NOISE_PX", "check_enough", "check_known", "told"]
 
-# Corners are never taken to be better than this, pixels, when asking what the views can tell.
+# Corners are never taken to be better than this, pixels, when asking what views or lines can tell.
 LEAST_NOISE_PX = 0.1
 # A scale less certain than this share of itself is not known.
 VAGUE_SHARE = 0.1

@@ -20,14 +20,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.fitting.spline_values import SplineValues
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
 
-__all__ = ["Linearised", "ResidualSlopes"]
+__all__ = ["ROUNDING_SHARE", "Linearised", "ResidualSlopes", "SharedInverse"]
 
 # This is added to a scaled system's diagonal before it is inverted.
 ROUNDING_SHARE = 1e-13
@@ -42,7 +44,7 @@ class ResidualSlopes:
     Attributes:
         camera: (m,k,2p) by the camera's named parameters.
         pose: (m,6,2p) by the pose of the view.
-        spline: (m,p,g) value of each spline of the lens's displacement at each corner; g = 0 for a formula.
+        spline: value of each of the g splines of the lens's displacement at each corner; g = 0 for a formula.
         corner: (m,p,2,3) pixels per metre, by the place of each corner in the target's frame; p = 0 there
             where the target is flat.
         surface: (p,r) what the surface's coefficients multiply; r = 0 where there is none.
@@ -51,7 +53,7 @@ class ResidualSlopes:
 
     camera: Float[ndarray, "m k n"]
     pose: Float[ndarray, "m 6 n"]
-    spline: Float[ndarray, "m p g"]
+    spline: SplineValues
     corner: Float[ndarray, "m c 2 3"]
     surface: Float[ndarray, "p r"]
     plane: Float[ndarray, "2 2"]
@@ -59,7 +61,49 @@ class ResidualSlopes:
     @cached_property
     def sizes(self) -> tuple[int, int, int, int]:
         """k, g, r and how many corners move on their own."""
-        return self.camera.shape[1], self.spline.shape[2], self.surface.shape[1], self.corner.shape[1]
+        return self.camera.shape[1], self.spline.splines, self.surface.shape[1], self.corner.shape[1]
+
+
+class SharedInverse(NamedTuple):
+    """H^-1, as it was found: single corners may have been eliminated.
+
+    Attributes:
+        covariance: (s,s) the inverse of what was left.
+        blocks: (b,3,3) C^-1 of the corners that were eliminated; none where it was the views.
+        crossed: (s,3b) sums of what was left with them. What was left are the shared unknowns, but for these
+            corners, and then the poses.
+    """
+
+    covariance: Float[ndarray, "s s"]
+    blocks: Float[ndarray, "b 3 3"]
+    crossed: Float[ndarray, "s c"]
+
+    @classmethod
+    def of(cls, normal: NormalEquations, *, by_corner: bool) -> SharedInverse:
+        """Of the solver's sums, priors included.
+
+        Args:
+            normal: the sums.
+            by_corner: whether single corners were eliminated in them; else the views.
+        """
+        roots, s = inverse_roots(normal.C), len(normal.A)
+        covariance = _inverse(eliminated(normal, roots))
+        if not by_corner:
+            return cls(covariance, np.zeros((0, SPACE, SPACE)), np.zeros((s, 0)))
+        crossed = normal.B.transpose(1, 0, 2).reshape(s, -1)
+        return cls(covariance, roots @ roots.transpose(0, 2, 1), crossed)
+
+    def times(self, pulls: Float[ndarray, "q c"]) -> Float[ndarray, "q c"]:
+        """H^-1 times vectors."""
+        if not len(self.blocks):
+            return self.covariance @ pulls
+        n, columns, blocks = len(pulls) - self.crossed.shape[1], pulls.shape[1], (len(self.blocks), SPACE, -1)
+        scaled = self.blocks @ pulls[n:].reshape(blocks)  # C^-1 b
+        right = -(self.crossed @ scaled.reshape(-1, columns))
+        right[:n] += pulls[:n]
+        found = self.covariance @ right
+        of_corners = scaled - self.blocks @ (self.crossed.T @ found).reshape(blocks)
+        return np.concatenate([found[:n], of_corners.reshape(-1, columns)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +121,7 @@ class Linearised:
         shape_precision: (3r + 3p,), the diagonal of L for surface and single corners; L is 0 for the camera's
             parameters.
         noise: px^2 of a coordinate.
-        normal: the solver's sums at the estimate, priors included.
-        by_corner: whether single corners were eliminated in them; else the views.
+        inverse: H^-1.
     """
 
     camera: Camera
@@ -90,8 +133,7 @@ class Linearised:
     spline_precision: Float[ndarray, "g g"]
     shape_precision: Float[ndarray, " s"]
     noise: float
-    normal: NormalEquations
-    by_corner: bool
+    inverse: SharedInverse
 
     @property
     def views(self) -> int:
@@ -114,18 +156,18 @@ class Linearised:
         """e_j: weighted residuals, the pose of each view fitted."""
         return self.without_pose(self.root * self.residual)
 
-    def only(self, rows: Int[ndarray, " v"]) -> Linearised:
+    def only(self, rows: Int[ndarray, " v"] | slice) -> Linearised:
         """The same fit, which all its views made, with the rows of some of them."""
         slopes = self.slopes
         kept = replace(
             slopes,
             camera=slopes.camera[rows],
             pose=slopes.pose[rows],
-            spline=slopes.spline[rows],
+            spline=slopes.spline.only(rows),
             corner=slopes.corner[rows],
         )
         some = replace(self, slopes=kept, residual=self.residual[rows], root=self.root[rows])
-        some.__dict__.update(_covariance=self._covariance, _inverse_blocks=self._inverse_blocks)
+        some.__dict__.update(_weighted_poses=self._weighted_poses[rows], _poses=self._poses[rows])
         return some
 
     def without_pose(self, rows: ndarray, *, weighted: bool = True) -> ndarray:
@@ -150,7 +192,7 @@ class Linearised:
         n = self.residual.shape[1]
         moved = self.slopes.camera.transpose(0, 2, 1) @ x[..., :k, :]
         if g:
-            along, across = (self.slopes.spline @ x[..., k + i * g : k + (i + 1) * g, :] for i in (0, 1))
+            along, across = (self.slopes.spline.times(x[..., k + i * g : k + (i + 1) * g, :]) for i in (0, 1))
             (xx, xy), (yx, yy) = self.slopes.plane
             moved[:, : n // 2] += xx * along + xy * across
             moved[:, n // 2 :] += yx * along + yy * across
@@ -182,8 +224,8 @@ class Linearised:
         if g:
             (xx, xy), (yx, yy) = self.slopes.plane
             u, v = rows[:, : n // 2], rows[:, n // 2 :]
-            down = self.slopes.spline.transpose(0, 2, 1)
-            out[:, k : k + g], out[:, k + g : k + 2 * g] = down @ (xx * u + yx * v), down @ (xy * u + yy * v)
+            out[:, k : k + g] = self.slopes.spline.gathered(xx * u + yx * v)
+            out[:, k + g : k + 2 * g] = self.slopes.spline.gathered(xy * u + yy * v)
         if len(self.shape_precision):
             out[:, self.of_camera :] = self._gathered_by_shape(self.slopes.corner, rows)
         return out
@@ -215,16 +257,7 @@ class Linearised:
         if pulls.ndim == 3:
             m, q, c = pulls.shape
             return self.solved(pulls.transpose(1, 0, 2).reshape(q, m * c)).reshape(q, m, c).transpose(1, 0, 2)
-        if not self.by_corner:
-            return self._covariance @ pulls
-        n = self.unknowns - SPACE * len(self._inverse_blocks)
-        columns, blocks = pulls.shape[1], (len(self._inverse_blocks), SPACE, -1)
-        scaled = self._inverse_blocks @ pulls[n:].reshape(blocks)  # C^-1 b
-        right = -(self._crossed @ scaled.reshape(-1, columns))
-        right[:n] += pulls[:n]
-        found = self._covariance @ right
-        of_corners = scaled - self._inverse_blocks @ (self._crossed.T @ found).reshape(blocks)
-        return np.concatenate([found[:n], of_corners.reshape(-1, columns)])
+        return self.inverse.times(pulls)
 
     @cached_property
     def camera_columns(self) -> Float[ndarray, "q d"]:
@@ -274,21 +307,6 @@ class Linearised:
     @cached_property
     def _poses(self) -> Float[ndarray, "m n 6"]:
         return _orthonormal(self.slopes.pose.transpose(0, 2, 1))
-
-    @cached_property
-    def _inverse_blocks(self) -> ndarray:
-        return np.linalg.inv(self.normal.C)
-
-    @cached_property
-    def _crossed(self) -> Float[ndarray, "s b"]:
-        """The sums of the shared unknowns with those that were eliminated."""
-        B = self.normal.B
-        return B.transpose(1, 0, 2).reshape(B.shape[1], -1)
-
-    @cached_property
-    def _covariance(self) -> Float[ndarray, "s s"]:
-        """The inverse of the shared system, the blocks eliminated; over sigma^2."""
-        return _inverse(eliminated(self.normal, inverse_roots(self.normal.C)))
 
 
 def _orthonormal(columns: Float[ndarray, "m n 6"]) -> Float[ndarray, "m n 6"]:

@@ -13,6 +13,7 @@ import numpy as np
 from orthoscope.fitting.linearised import ResidualSlopes
 from orthoscope.fitting.observations import Observations, Poses
 from orthoscope.fitting.reprojection import POSE, Estimate, Places, Reprojection
+from orthoscope.fitting.spline_values import SplineValues
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.free_lens import FreeLens
@@ -41,9 +42,9 @@ def residual_slopes(
         moves: whether slopes by the places of corners are wanted.
     """
     m, p = observations.ids.shape
-    k, g = len(free), camera.lens.over.lattice.splines if isinstance(camera.lens, FreeLens) else 0
+    k = len(free)
     of_camera, of_pose, residual = np.empty((m, k, 2 * p)), np.empty((m, POSE, 2 * p)), np.empty((m, 2 * p))
-    of_corner, of_spline = np.empty((m, p if moves else 0, 2, SPACE)), np.zeros((m, p, g))
+    of_corner, of_spline = np.empty((m, p if moves else 0, 2, SPACE)), _room_for_splines(camera, m, p)
     reprojection = Reprojection(observations, points, camera, free)
     for chunk in observations.chunks():
         stacked = reprojection.stack(Estimate(camera, poses), chunk, Places(*points.T))
@@ -56,9 +57,12 @@ def residual_slopes(
             turned = by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows])  # (v, p, 3, 2)
             of_corner[chunk.rows] = turned.transpose(0, 1, 3, 2)
         if isinstance(camera.lens, FreeLens):
-            of_spline[chunk.rows] = spline_values(camera.lens, poses.only(chunk.rows), points)
+            lattice, places = camera.lens.over.lattice, _places(camera.lens, poses.only(chunk.rows), points)
+            of_spline.across[chunk.rows] = lattice.along(places[0], 0)[0]
+            of_spline.down[chunk.rows] = (
+                lattice.along(places[1], 1)[0] * observations.present[chunk.rows, :, None]
+            )
     frame = camera.lens_frame or camera.intrinsics
-    of_spline *= observations.present[:, :, None]
     surface = np.zeros((p, 0))
     return ResidualSlopes(of_camera, of_pose, of_spline, of_corner, surface, frame.matrix[:2, :2]), residual
 
@@ -74,5 +78,18 @@ def by_corner(
 
 def spline_values(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "v p g"]:
     """The value of every spline at every corner's place in the base's distorted plane."""
+    return lens.over.lattice.design(*_places(lens, poses, points))
+
+
+def _places(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> tuple[ndarray, ndarray]:
+    """x and y (v,p) of every corner in the base's distorted plane."""
     in_camera = np.einsum("vab,pb->avp", poses.rotation, points) + poses.translation.T[:, :, None]
-    return lens.over.lattice.design(*lens.base.warp(*lens.chart.flatten(*in_camera)))
+    return lens.base.warp(*lens.chart.flatten(*in_camera))
+
+
+def _room_for_splines(camera: Camera, views: int, corners: int) -> SplineValues:
+    """Values yet to be filled in."""
+    if not isinstance(camera.lens, FreeLens):
+        return SplineValues.none(views, corners)
+    across, down = camera.lens.over.lattice.shape
+    return SplineValues(np.empty((views, corners, down)), np.empty((views, corners, across)))

@@ -19,7 +19,7 @@ from orthoscope.targets.detections import Detections, SetAside, View
 __all__ = ["with_usable_views"]
 
 # A homography needs this many corners.
-FEWEST_CORNERS = 4
+FEWEST_VIEW_CORNERS = 4
 # The width of a view in the image is at least this share of its length.
 LEAST_WIDTH_SHARE = 0.01
 
@@ -60,8 +60,8 @@ def _fault(view: View, off_a_line: Callable[[bytes], int]) -> str | None:
         view: the one in question.
         off_a_line: `_off_a_line` of the points whose ids, as bytes, it is given.
     """
-    if len(view.ids) < FEWEST_CORNERS:
-        return f"{len(view.ids)} corners; a view needs {FEWEST_CORNERS}"
+    if len(view.ids) < FEWEST_VIEW_CORNERS:
+        return f"{len(view.ids)} corners; a view needs {FEWEST_VIEW_CORNERS}"
     off = off_a_line(view.ids.tobytes())
     if off < 2:
         return f"all its corners{' but one' if off else ''} are on one line of the target"

@@ -34,7 +34,7 @@ from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
 from orthoscope.methods.own_centre import CENTRE_OPEN, with_own_centre
 from orthoscope.models.lenses import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
-from orthoscope.solve.losses import LOSSES, Loss
+from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Loss
 from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__
 
@@ -69,7 +69,7 @@ def fccm(
     own_centre: bool = False,
     skew: bool = False,
     loss: str = "linear",
-    loss_scale: float = 1.0,
+    loss_scale: float = USUAL_SCALE,
     max_steps: int = 200,
     progress: Callable[[int, float], None] | None = None,
 ) -> Calibration:
@@ -111,7 +111,7 @@ def fit_flat(
     own_centre: bool = False,
     skew: bool = False,
     loss: str = "linear",
-    loss_scale: float = 1.0,
+    loss_scale: float = USUAL_SCALE,
     max_steps: int = 200,
     progress: Callable[[int, float], None] | None = None,
 ) -> Calibration:

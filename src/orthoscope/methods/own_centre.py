@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from orthoscope.fitting.identifiability import LEAST_NOISE_PX
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import Float, ndarray
@@ -25,8 +26,6 @@ from orthoscope.solve.losses import Loss
 
 __all__ = ["CENTRE_OPEN", "centre_is_told", "with_own_centre"]
 
-# Corners are never taken to be better than this, pixels, when asking whether they tell the centre.
-LEAST_NOISE_PX = 0.1
 # A centre less certain than this share of the diagonal is not known: fitted to noise alone, a lens has one
 # that seems certain to 2 or 3 %.
 VAGUE_SHARE = 0.01

@@ -38,8 +38,8 @@ __all__ = [
 SPLIT_COUNT = 4
 STUDY = "photographs"
 REPEATED_ENTRY = next(entry for entry in OURS if entry.name == REPEATED)
-# With fewer views a split tests on a single photograph.
-FEWEST_VIEWS = 8
+# With fewer photographs a split tests on a single one.
+FEWEST_PHOTOGRAPHS = 8
 
 
 class Straightened(NamedTuple):
@@ -58,10 +58,10 @@ def check_views(detections: Detections) -> None:
     Raises:
         CalibrationError: there are too few.
     """
-    if len(detections.views) < FEWEST_VIEWS:
+    if len(detections.views) < FEWEST_PHOTOGRAPHS:
         raise CalibrationError(
             f"the target was found in {len(detections.views)} photographs; the paper's comparison needs"
-            f" {FEWEST_VIEWS} at least, of which one in four is for testing. Take more photographs."
+            f" {FEWEST_PHOTOGRAPHS} at least, of which one in four is for testing. Take more photographs."
         )
 
 

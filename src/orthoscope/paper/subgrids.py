@@ -19,7 +19,7 @@ from orthoscope.targets.target import Target
 __all__ = ["ids_of_subgrid", "on_subgrid", "subgrids"]
 
 # The shorter side has at least this many corners; with two, a line is straight whatever the lens.
-FEWEST_CORNERS = 3
+SHORTEST_SIDE = 3
 
 
 def subgrids(grid: tuple[int, int], count: int) -> tuple[tuple[int, int], ...]:
@@ -28,7 +28,7 @@ def subgrids(grid: tuple[int, int], count: int) -> tuple[tuple[int, int], ...]:
     """
     shorter, longer = sorted(grid)
     sides = (
-        np.unique(np.geomspace(min(FEWEST_CORNERS, shorter), shorter, count).round().astype(int))
+        np.unique(np.geomspace(min(SHORTEST_SIDE, shorter), shorter, count).round().astype(int))
         if count > 1
         else np.array([shorter])
     )

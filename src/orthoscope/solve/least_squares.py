@@ -44,6 +44,8 @@ LEAST_DAMPING = 1e-15
 MOST_DAMPING = 1e12
 # An eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured there.
 LARGEST_OPEN_EIGENVALUE = 1e-14
+# Views are eliminated so many numbers at a time (16 MB).
+NUMBERS_AT_ONCE = 1 << 21
 # An unknown that has at least this share (squared) in such a direction is open too.
 OPEN_SHARE = 1e-8
 
@@ -320,8 +322,13 @@ def eliminated(sums: NormalEquations, roots: Float[ndarray, "m p p"]) -> Float[n
         roots: G of each view, C^-1 = G G'.
     """
     m, k, p = sums.B.shape
-    W = (sums.B @ roots).transpose(1, 0, 2).reshape(k, m * p)
-    return sums.A - W @ W.T
+    left = sums.A.copy()
+    at_once = max(1, NUMBERS_AT_ONCE // max(k * p, 1))
+    for start in range(0, m, at_once):
+        some = slice(start, start + at_once)
+        W = (sums.B[some] @ roots[some]).transpose(1, 0, 2).reshape(k, len(roots[some]) * p)
+        left -= W @ W.T
+    return left
 
 
 def inverse_roots(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:

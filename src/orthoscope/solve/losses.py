@@ -13,7 +13,10 @@ import numpy as np
 
 from orthoscope.geometry.arrays import InputError, ndarray
 
-__all__ = ["LOSSES", "Cauchy", "Huber", "Linear", "Loss"]
+__all__ = ["LOSSES", "USUAL_SCALE", "Cauchy", "Huber", "Linear", "Loss"]
+
+# A loss forgives from this residual on where nobody says otherwise: found corners miss by less, pixels.
+USUAL_SCALE = 1.0
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Loss(ABC):
         InputError: the scale is not positive.
     """
 
-    scale: float = 1.0
+    scale: float = USUAL_SCALE
 
     def __post_init__(self) -> None:
         if not self.scale > 0:

@@ -329,3 +329,11 @@ def test_on_real_photographs_the_shape_of_the_board_is_worth_more_than_any_formu
     best, *others = found.standings
     assert best.entry.method == "decoupled"
     assert all(standing.loses_px > 5.0 * standing.loses_error_px for standing in others)
+
+
+def test_printed_it_is_a_line_for_each_entry(comparison):
+    lines = repr(comparison).splitlines()
+    assert len(lines) == 1 + len(comparison.standings)
+    for line, standing in zip(lines[1:], comparison.standings, strict=True):
+        assert standing.entry.name in line
+        assert len(line) < 200

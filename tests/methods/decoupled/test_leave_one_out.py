@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.bent_boards import bowed, photographed_with
 from helpers.scenes import NARROW
 from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.leave_one_out import hat_of, leave_one_out
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.near_copies import near_copies, summed_over
 from orthoscope.fitting.resection import resect
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.fccm import fccm
-from orthoscope.targets.detections import Detections
+from orthoscope.targets.detections import Detections, View
 
 KINDS = [("flat", "formula"), ("smooth", "formula"), ("free", "formula"), ("flat", "free"), ("free", "free")]
 
@@ -104,3 +107,51 @@ def test_the_order_of_the_views_does_not_matter(photographs: Detections):
         leave_one_out(linearised(fitted(some, "smooth", "formula"))) for some in (photographs, backwards)
     )
     assert_allclose(forth.squares, back.squares[::-1], rtol=1e-5)
+
+
+def test_views_looked_at_together_or_in_parts_say_the_same(
+    fit: tuple[StepOneFit, Linearised], monkeypatch: pytest.MonkeyPatch
+):
+    known = fit[1]
+    rows = np.random.default_rng(2).standard_normal((*known.residual.shape, 2)) * (known.root > 0)[..., None]
+    together = hat_of(known, rows)
+    monkeypatch.setattr("orthoscope.fitting.leave_one_out.VIEWS_AT_ONCE", 3)
+    assert_allclose(hat_of(known, rows), together, rtol=1e-9, atol=1e-9)
+
+
+def test_of_photographs_that_were_taken_twice_both_are_left_out(photographs: Detections):
+    """Copies foretell nothing new: errors and scatter are those of the photographs taken once."""
+    copies = tuple(
+        replace(view, image=f"again {view.image}", pixels=view.pixels + 1e-6) for view in photographs.views
+    )
+    twice = replace(photographs, views=(*photographs.views, *copies))
+    groups = near_copies(twice)
+    assert_array_equal(groups, [*range(8), *range(8)])
+    once, both, alone = (
+        leave_one_out(linearised(fitted(some, "flat", "formula")), which)
+        for some, which in ((photographs, None), (twice, groups), (twice, None))
+    )
+    assert_allclose(both.squares, [*once.squares, *once.squares], rtol=1e-3)
+    assert_allclose(both.scatter.T @ both.scatter, once.scatter.T @ once.scatter, rtol=5e-3)
+    assert alone.squares.sum() < 0.95 * both.squares.sum()  # a copy foretells the other
+
+
+def test_photographs_are_copies_where_most_of_their_corners_are_at_the_same_place(photographs: Detections):
+    first = photographs.views[0]
+    shifted = [
+        View(name, first.ids[part], first.pixels[part] + shift)
+        for name, part, shift in (
+            ("a hair aside", slice(None), 0.4),
+            ("half of it", slice(0, 30), 0.4),
+            ("farther", slice(None), 3.0),
+            ("three corners", slice(0, 3), 0.0),
+        )
+    ]
+    found = near_copies(replace(photographs, views=(*photographs.views, *shifted)))
+    assert_array_equal(found[8:], [0, 0, 8, 9])
+
+
+def test_what_copies_share_is_summed():
+    groups, values = np.array([0, 1, 0, 2]), np.array([1.0, 2.0, 3.0, 4.0])
+    assert_allclose(summed_over(groups, values), [4.0, 2.0, 4.0, 4.0])
+    assert_allclose(summed_over(np.arange(4), values), values)

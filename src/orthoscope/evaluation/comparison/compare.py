@@ -23,10 +23,11 @@ from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
 from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
 from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.disc_centres import has_outlines
-from orthoscope.fitting.held_out import FEWEST_VIEWS, folds_of_views, held_out, rms_and_error
+from orthoscope.fitting.held_out import FEWEST_VIEWS, USUAL_FOLDS, folds_of_views, held_out, rms_and_error
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.geometry.blas import with_one_thread
+from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import METHODS, calibrate
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.camera import Camera
@@ -88,6 +89,13 @@ class Comparison:
     folds: int
     standings: tuple[Standing, ...]
 
+    def __repr__(self) -> str:
+        told = (
+            f"\n  {each.entry.name}: {each.failure or with_error(each.held_out_px, each.error_px) + ' px'}"
+            for each in self.standings
+        )
+        return f"Comparison({len(self.standings)} entries, held out on {self.detections!r}){''.join(told)}"
+
     @property
     def judged(self) -> tuple[Standing, ...]:
         """Those that every view could judge, the best first; empty where there are none."""
@@ -99,7 +107,7 @@ def compare(
     detections: Detections,
     entries: Sequence[Entry | str] = USUAL,
     *,
-    folds: int = 5,
+    folds: int = USUAL_FOLDS,
     executor: Executor | None = None,
     progress: Progress | None = None,
     clock: Callable[[], float] = time.perf_counter,

@@ -26,9 +26,9 @@ SURE_P_VALUE_OVER_VIEWS = 0.05
 # A misfit that is smaller than this share of the noise adds less than a thirtieth to the error.
 TELLING_SHARE = 0.25
 # No misfit that is smaller, pixels, matters to anyone.
-NEGLIGIBLE_PX = 0.01
+NEGLIGIBLE_MISFIT_PX = 0.01
 # With fewer views "the same in all views" means nothing.
-FEWEST_VIEWS = 3
+FEWEST_AGREEING_VIEWS = 3
 # At least so many degrees of freedom are left for the noise.
 FEWEST_DEGREES_WITHIN = 10
 # Up to so many views every combination of signs is tried; with more, as many at random.
@@ -65,7 +65,7 @@ def is_misfit(test: MisfitTest, views: int) -> bool:
     certain = test.p_value < SURE_P_VALUE and test.p_over_views <= max(
         SURE_P_VALUE_OVER_VIEWS, 2.0 ** (1 - views)
     )
-    return certain and test.systematic_px > max(TELLING_SHARE * test.noise_px, NEGLIGIBLE_PX)
+    return certain and test.systematic_px > max(TELLING_SHARE * test.noise_px, NEGLIGIBLE_MISFIT_PX)
 
 
 class Agreement(NamedTuple):
@@ -95,7 +95,7 @@ def agreement(columns: Columns, whole: Whitening, tested: tuple[int, ...]) -> Ag
     of_all, of_A = scores @ whole.white.T, scores[:, A] @ white_A.T
     rank_A, rank_B = _rank(white_A), _rank(whole.white[:, B])
     within = 2 * len(left) - columns.poses_rank - rank_A - rank_B
-    if columns.views < FEWEST_VIEWS or within < FEWEST_DEGREES_WITHIN or rank_B < 1:
+    if columns.views < FEWEST_AGREEING_VIEWS or within < FEWEST_DEGREES_WITHIN or rank_B < 1:
         return Agreement(MisfitTest(*[float("nan")] * 8), np.zeros(len(B)))
     by_A = of_A @ of_A.T
     test = _voted(

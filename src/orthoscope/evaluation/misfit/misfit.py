@@ -64,7 +64,7 @@ from orthoscope.models.difference import image_difference
 __all__ = ["LensMisfit", "Misfit", "MisfitTest", "TargetMisfit", "misfit"]
 
 # The image has about so many cells: finer than any lens varies, coarse enough for some corners in each.
-CELL_COUNT = 48
+MISFIT_CELLS = 48
 # The target has about so many patches: each corner is one, but where there are more corners.
 PATCH_COUNT = 300
 # The block with this number is tested for the target.
@@ -124,20 +124,19 @@ def misfit(calibration: Calibration) -> Misfit:
     residuals.
     """
     detections = calibration.detections
-    cells, patches = cells_for(detections.image_size, CELL_COUNT), _patches(detections.target.points)
+    cells, patches = cells_for(detections.image_size, MISFIT_CELLS), _patches(detections.target.points)
     slopes = slopes_of(calibration)
     weight = _weights(slopes.residual)[:, None, None]
-    camera = Block(weight * slopes.by_camera, np.zeros_like(slopes.view), 1)
+    smooth_terms = _smooth_terms(calibration.camera, slopes.pixels + slopes.residual)
+    for rows in (slopes.by_camera, slopes.by_pose, smooth_terms):
+        rows *= weight  # of many corners these are large, and nothing else wants them without weights
+    camera = Block(slopes.by_camera, np.zeros_like(slopes.view), 1)
     image = Block(weight * np.eye(2), cells.of(slopes.pixels), cells.columns * cells.rows)
     target = Block(weight * slopes.by_place, patches[slopes.corner], int(patches.max(initial=-1)) + 1)
-    smooth = Block(
-        weight * _smooth_terms(calibration.camera, slopes.pixels + slopes.residual),
-        np.zeros_like(slopes.view),
-        1,
-    )
+    smooth = Block(smooth_terms, np.zeros_like(slopes.view), 1)
     columns = Columns(
         weight[:, 0] * slopes.residual,
-        weight * slopes.by_pose,
+        slopes.by_pose,
         slopes.view,
         len(detections.views),
         (target, camera, image, smooth),

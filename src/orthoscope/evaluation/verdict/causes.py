@@ -26,7 +26,7 @@ LEVEL_DEGREES = 12.0
 # Cameras that differ by less than this share of the corners' noise are as good as one.
 NOTICED_SHARE = 0.5
 # Cameras that differ by less, pixels, are one camera for everyone.
-NEGLIGIBLE_PX = 0.05
+NEGLIGIBLE_DIFFERENCE_PX = 0.05
 # A free lens may miss up to this share of the corners' noise.
 STIFF_SHARE = 0.5
 # Chance makes hardly so large a share of the corners wild.
@@ -64,7 +64,7 @@ def listed(images: Sequence[str]) -> str:
 
 
 def _matters(s: Situation) -> bool:
-    return bool(s.disagree) and s.differ_px > max(NOTICED_SHARE * s.noise_px, NEGLIGIBLE_PX)
+    return bool(s.disagree) and s.differ_px > max(NOTICED_SHARE * s.noise_px, NEGLIGIBLE_DIFFERENCE_PX)
 
 
 def _lens_is_missed(s: Situation) -> bool:
@@ -151,7 +151,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "target",
-        lambda s: s.target_px > 0.0,
+        lambda s: s.target_px > 0.0,  # where misfit/f_test.py takes it for one
         _as_far_as_it_goes,
         lambda s: f"{_target(s)}: in every photograph its corners are off by the same {s.target_mm:.2g} mm",
     ),

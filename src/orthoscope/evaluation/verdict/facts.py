@@ -13,17 +13,13 @@ from orthoscope.evaluation.misfit.f_test import is_misfit
 from orthoscope.evaluation.misfit.misfit import Misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit
 from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
-from orthoscope.evaluation.verdict.situation import FINE_PX, USUAL_WIDTH, Situation, coarse_px
+from orthoscope.evaluation.verdict.situation import FINE_PX, Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.near_copies import near_copies
 from orthoscope.solve.least_squares import Status
-from orthoscope.targets.detections import Detections
 
-__all__ = ["Findings", "corners_beyond", "distinct_views", "share_within", "situation_of"]
+__all__ = ["Findings", "corners_beyond", "share_within", "situation_of"]
 
-# Views whose corners are apart by less (median, pixels in an image of 1000) are the same photograph again.
-COPIED_PX = 1.0
-# So many corners show that most pairs of photographs differ.
-SAMPLE_CORNERS = 16
 # With no more than this share of the views left without copies, that they agree says nothing.
 DISTINCT_SHARE = 0.7
 # A residual of more than this many times the median is farther off than heavy tails reach.
@@ -47,7 +43,8 @@ def situation_of(found: Findings) -> Situation:
     """The facts."""
     calibration, reference, disagreement = found.calibration, found.reference, found.disagreement
     detections, settings = calibration.detections, calibration.settings
-    views, distinct = len(detections.views), distinct_views(detections)
+    views, distinct = len(detections.views), len(np.unique(near_copies(detections)))
+    larger = _by_copies(reference, views / distinct)
     target, lens = found.misfit.target, found.misfit.lens
     images = [view.image for view in detections.views]
     known = reference.known if reference else None
@@ -64,11 +61,11 @@ def situation_of(found: Findings) -> Situation:
         views=views,
         distinct=distinct,
         converged=calibration.status == Status.CONVERGED,
-        error_px=_error(reference, disagreement, views / distinct),
-        near_px=_error(reference, disagreement, views / distinct, near=True),
+        error_px=_error(reference, disagreement, larger),
+        near_px=_error(reference, disagreement, larger, near=True),
         centre_sd=_centre_deviation(calibration),
         coarse_px=coarse_px(detections.image_size),
-        share=share_within(reference, np.sqrt(views / distinct)),
+        share=share_within(reference, larger),
         covered=share_covered(calibration),
         place=emptiest_place(detections),
         noise_px=float(np.sqrt(2.0 * known.noise)) if known else calibration.rms_px,
@@ -101,27 +98,6 @@ def corners_beyond(calibration: Calibration) -> int:
     return int(np.isnan(calibration.camera.project(seen)[:, 0]).sum())
 
 
-def distinct_views(detections: Detections) -> int:
-    """How many photographs differ from all those before them."""
-    near = COPIED_PX * max(1.0, max(detections.image_size) / USUAL_WIDTH)
-    tables = np.full((len(detections.views), len(detections.target.points), 2), np.nan)
-    for table, view in zip(tables, detections.views, strict=True):
-        table[view.ids] = view.pixels
-    kept = np.empty_like(tables)
-    some = np.unique(np.linspace(0, tables.shape[1] - 1, SAMPLE_CORNERS).round().astype(int))
-    count = 0
-    for table in tables:
-        # Where none of a few corners is near, half of all are not.
-        sampled = np.hypot(*np.moveaxis(kept[:count, some] - table[some], -1, 0))
-        likely = np.flatnonzero((sampled < near).any(1) | np.isnan(sampled).all(1))
-        gaps = np.hypot(*np.moveaxis(kept[likely] - table, -1, 0))
-        gaps = gaps[np.isfinite(gaps).sum(1) >= 4]
-        if not len(gaps) or not (np.nanmedian(gaps, axis=1) < near).any():
-            kept[count] = table
-            count += 1
-    return count
-
-
 def share_within(reference: ReferenceFit | None, larger: float = 1.0, limit: float = FINE_PX) -> float:
     """The share of the frame, where the camera has an image, over which its predicted error is below a limit.
 
@@ -134,20 +110,33 @@ def share_within(reference: ReferenceFit | None, larger: float = 1.0, limit: flo
     return float((larger * known <= limit).mean()) if known.size else 0.0
 
 
+def _by_copies(reference: ReferenceFit | None, copies: float) -> float:
+    """By how much the error is larger than predicted, since copies share their errors: what is predicted of
+    errors within views counted each of them, what is predicted by leaving photographs out did not.
+
+    Args:
+        copies: photographs for each that is distinct.
+    """
+    if reference is None:
+        return 1.0
+    error = reference.error
+    return max(1.0, float(np.sqrt(copies)) * error.alike_px / max(error.seen_px, 1e-300))
+
+
 def _error(
-    reference: ReferenceFit | None, disagreement: Disagreement, copies: float, *, near: bool = False
+    reference: ReferenceFit | None, disagreement: Disagreement, larger: float, *, near: bool = False
 ) -> float:
     """The camera error: that of the camera, and of how cameras differ from photograph to photograph.
 
     Args:
-        copies: photographs for each that is distinct; copies add nothing, and each was counted.
+        larger: by how much the first is larger than predicted.
         near: of things where the target was, else of what is far away.
     """
     if reference is None:
         return float("nan")
     apart = 0.0 if disagreement.kind == "shutter" else disagreement.by_px
     own = reference.error.near_seen_px if near else reference.error.seen_px
-    return float(np.hypot(np.sqrt(copies) * own, apart))
+    return float(np.hypot(larger * own, apart))
 
 
 def _centre_deviation(calibration: Calibration) -> float:

@@ -9,13 +9,14 @@ no photograph is foreseen by so few others that another choice would have been r
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.near_copies import near_copies
 from orthoscope.fitting.scatter import Scatter, scatter_of
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.fitters import Fitter, Kept
@@ -41,10 +42,15 @@ class Candidates:
 
     def __init__(self, detections: Detections, *, skew: bool, fitter: Fitter | None = None) -> None:
         self.detections, self._skew = detections, skew
+        self._photographs = near_copies(detections)
         self._fitter = fitter or Kept(detections, skew=skew)
         self.flat, self.step_one = cache(self._fitter.flat), cache(self._fitter.step_one)
-        self.linearised, self.left_out = cache(self._linearised), cache(self._left_out)
+        # Large, of many views; what is asked for of one model is asked for together.
+        self.linearised, self.left_out = (
+            lru_cache(maxsize=1)(make) for make in (self._linearised, self._left_out)
+        )
         self.from_pairs, self.scatter = cache(self._from_pairs), cache(self._scatter)
+        self.residuals = cache(self._residuals)
 
     def contender(self, model: Model) -> Contender:
         """The model with its squared held-out residuals; NaN in views where the others cannot tell, or in all
@@ -56,7 +62,7 @@ class Candidates:
             squares = np.full(len(self.detections.views), np.nan)
         return Contender(model.base, model.shape, model.lens, model.fit, squares)
 
-    def residuals(self, model: Model) -> Float[ndarray, "m n"]:
+    def _residuals(self, model: Model) -> Float[ndarray, "m n"]:
         """Of each view by the model without it, as in `LeaveOneOut`.
 
         Raises:
@@ -90,7 +96,7 @@ class Candidates:
         return linearised(self.step_one(model))
 
     def _left_out(self, model: Model) -> LeaveOneOut:
-        return leave_one_out(self.linearised(model))
+        return leave_one_out(self.linearised(model), self._photographs)
 
     def _scatter(self, model: Model) -> Scatter:
         """How the model's camera scatters."""

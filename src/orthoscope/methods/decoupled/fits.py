@@ -9,6 +9,7 @@ import numpy as np
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.fits import Fits, OwnFit, RichestFit
 from orthoscope.fitting.leave_one_out import leave_one_out
+from orthoscope.fitting.near_copies import near_copies
 from orthoscope.fitting.scatter import scatter_of
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.methods.decoupled.candidates import Candidates
@@ -60,7 +61,7 @@ def _own(calibration: Calibration, candidates: Candidates) -> OwnFit | None:
             return OwnFit(candidates.residuals(model), candidates.scatter(model))
         if calibration.method == "fccm":
             mine = linearised_flat(calibration)
-            left_out = leave_one_out(mine)
+            left_out = leave_one_out(mine, near_copies(calibration.detections))
             return OwnFit(
                 left_out.residuals, scatter_of(mine, left_out, calibration.detections.target.points)
             )

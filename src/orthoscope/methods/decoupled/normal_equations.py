@@ -126,6 +126,10 @@ class Measurements:
                         _add_spline_and_corners(sums, design, turned, k, frame)
         return sums._replace(cost=cost)
 
+    def forget(self) -> None:
+        """Give back what the last sums took."""
+        self._last = None
+
     def residuals(
         self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"]
     ) -> Float[ndarray, "m p 2"]:

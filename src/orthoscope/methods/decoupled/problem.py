@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.fitting.linearised import ROUNDING_SHARE
 from orthoscope.fitting.observations import Poses
 from orthoscope.fitting.reprojection import POSE
 from orthoscope.geometry.arrays import Float, ndarray
@@ -33,9 +34,6 @@ from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_
 from orthoscope.solve.losses import Loss
 
 __all__ = ["DecoupledEstimate", "Joint", "Known", "Precisions"]
-
-# This is added to a scaled system's diagonal before it is inverted.
-ROUNDING_SHARE = 1e-13
 
 
 class DecoupledEstimate(NamedTuple):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.linearised import Linearised, SharedInverse
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import POSE
 from orthoscope.fitting.residual_slopes import residual_slopes
@@ -59,6 +59,8 @@ def linearised_flat(calibration: Calibration) -> Linearised:
 def _linearised(problem: Joint, estimate: DecoupledEstimate, loss: Loss, noise: float) -> Linearised:
     observations, points = problem.measurements.observations, problem.corners(estimate)
     moves = problem.single or problem.surface.shape[1] > 0
+    inverse = SharedInverse.of(problem.linearise(estimate, loss), by_corner=problem.by_corner)
+    problem.measurements.forget()
     slopes, residual = residual_slopes(
         observations, estimate.camera, estimate.poses, points, problem.free, moves=moves
     )
@@ -75,8 +77,7 @@ def _linearised(problem: Joint, estimate: DecoupledEstimate, loss: Loss, noise: 
             [surface.ravel(), np.tile(singles, len(points)) if problem.single else np.empty(0)]
         ),
         noise=noise,
-        normal=problem.linearise(estimate, loss),
-        by_corner=problem.by_corner,
+        inverse=inverse,
     )
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from orthoscope.fitting.leave_one_out import LeaveOneOut, scattered
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.near_copies import summed_over
 from orthoscope.fitting.residual_slopes import residual_slopes
 from orthoscope.fitting.scatter import Scatter, likenesses, patterns_over_views
 from orthoscope.geometry.arrays import Float, ndarray
@@ -49,10 +50,12 @@ class PairsLeftOut:
         T = root[..., None] * slopes.camera.transpose(0, 2, 1)  # (m, n, f)
         self._T, self._gram = T, T.transpose(0, 2, 1) @ T
         self._by_shared, self._by_pose = self._steps_one(slopes.corner, slopes.pose, root)
-        without = self._gram.sum(0) - self._gram
-        right = (T * (root * residual)[..., None]).sum(1) - np.einsum(
-            "mfq,mq->mf", self._by_shared.sum(0) - self._by_shared, left_out.changes
+        groups = left_out.groups
+        without = self._gram.sum(0) - summed_over(groups, self._gram)
+        right = summed_over(groups, (T * (root * residual)[..., None]).sum(1)) - np.einsum(
+            "mfq,mq->mf", self._by_shared.sum(0) - summed_over(groups, self._by_shared), left_out.changes
         )
+        self._groups = groups
         self.changes = np.linalg.solve(without, right[..., None])[..., 0]
         moved = residual + (slopes.camera.transpose(0, 2, 1) @ self.changes[..., None])[..., 0]
         if slopes.corner.shape[1]:
@@ -87,7 +90,13 @@ class PairsLeftOut:
             alike += (larger - 1.0) * np.einsum("mfc,mgc->fg", through, through)
         s2 = known.noise
         return Scatter(
-            self.camera, self.names, s2 * model, s2 * alike, s2 * prior, scattered(self.changes), 0.0 * model
+            self.camera,
+            self.names,
+            s2 * model,
+            s2 * alike,
+            s2 * prior,
+            scattered(self.changes, self._groups),
+            0.0 * model,
         )
 
     def _steps_one(

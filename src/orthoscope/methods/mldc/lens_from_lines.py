@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from orthoscope.fitting.identifiability import LEAST_NOISE_PX
 from orthoscope.fitting.initial_camera import FIELDS_OF_VIEW
 from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
@@ -39,8 +40,6 @@ __all__ = ["MEASURES", "StraightLens", "fit_straight_lens", "lens_of_lines"]
 STARTS_TRIED = 3
 # Errors beyond this share of the longer side hardly count in the first fit.
 FORGIVING_SHARE = 0.002
-# Corners are never taken to be better than this, pixels, when asking whether they tell the centre.
-LEAST_NOISE_PX = 0.1
 # A centre less certain than this share of the diagonal is not known.
 VAGUE_SHARE = 0.1
 # Costs that differ by less than this share are as good as one another.

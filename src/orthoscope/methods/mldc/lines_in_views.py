@@ -14,14 +14,14 @@ from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import Bool, CalibrationError, Int, ndarray
 from orthoscope.targets.target import Target
 
-__all__ = ["FEWEST_CORNERS", "SeenLines"]
+__all__ = ["FEWEST_LINE_CORNERS", "SeenLines"]
 
 # A line that says something has at least this many corners, since any two lie on one.
-FEWEST_CORNERS = 3
+FEWEST_LINE_CORNERS = 3
 
 
 class SeenLines(NamedTuple):
-    """Lines with at least FEWEST_CORNERS seen corners, padded to one length.
+    """Lines with at least FEWEST_LINE_CORNERS seen corners, padded to one length.
 
     Attributes:
         row: (l,) of the observations' table.
@@ -38,16 +38,16 @@ class SeenLines(NamedTuple):
         """The lines of every view.
 
         Raises:
-            CalibrationError: no view shows FEWEST_CORNERS corners of a line.
+            CalibrationError: no view shows FEWEST_LINE_CORNERS corners of a line.
         """
         on_line = _padded(target.lines, len(target.points))
         column = _column_of(observations, len(target.points))[
             :, on_line
         ]  # (views, lines, places), -1 where not seen
-        row, line = np.nonzero((column >= 0).sum(-1) >= FEWEST_CORNERS)
+        row, line = np.nonzero((column >= 0).sum(-1) >= FEWEST_LINE_CORNERS)
         if not len(row):
             raise CalibrationError(
-                f"no photograph shows {FEWEST_CORNERS} corners of a row or column of {target.name};"
+                f"no photograph shows {FEWEST_LINE_CORNERS} corners of a row or column of {target.name};"
                 " straightness cannot be judged without. Use a target with rows and columns,"
                 " photographed whole."
             )

@@ -50,7 +50,7 @@ from orthoscope.methods.mldc.repeated import Rounds, joint_parameters, repeat
 from orthoscope.methods.mldc.repeated_plain import repeat_plainly
 from orthoscope.methods.own_centre import centre_is_told
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
-from orthoscope.solve.losses import LOSSES, Loss
+from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Loss
 from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__
 
@@ -107,7 +107,7 @@ def mldc(
     weights: Sequence[float] = (1.0, 1.0, 1.0),
     skew: bool = False,
     loss: str = "linear",
-    loss_scale: float = 1.0,
+    loss_scale: float = USUAL_SCALE,
     rounds: int = 60,
     max_steps: int = 200,
     progress: Callable[[int, float], None] | None = None,

@@ -35,7 +35,7 @@ from orthoscope.methods.mldc.lens_from_lines import MEASURES, StraightLens, fit_
 from orthoscope.models.camera import WIDEST_ANGLE, Camera
 from orthoscope.models.lenses import lens_name
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance
-from orthoscope.solve.losses import LOSSES, Linear
+from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Linear
 from orthoscope.targets.detections import Detections, View
 from orthoscope.version import __version__
 
@@ -58,7 +58,7 @@ def nmldc(
     measure: str = "photograph",
     skew: bool = False,
     loss: str = "linear",
-    loss_scale: float = 1.0,
+    loss_scale: float = USUAL_SCALE,
     max_steps: int = 200,
     progress: Callable[[int, float], None] | None = None,
 ) -> Calibration:

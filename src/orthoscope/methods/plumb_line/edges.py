@@ -25,18 +25,18 @@ SHORTEST_PIECE = 0.015
 MOST_PIECES = 800
 # The brightness is looked at so far to both sides of a piece, pixels, in such steps.
 REACH, PROFILE_STEP = 3.0, 0.5
-# and so many of these looks, one for each pixel along the piece, are averaged: noise has peaks of its own.
-ALONG = 7
+# So many looks across a piece, one for each pixel along it, are averaged: noise has peaks of its own.
+AVERAGED_LOOKS = 7
 # A peak of the slope below this, grey values a pixel, is no edge.
 LEAST_SLOPE = 6.0
 # Ends of a piece are left out, pixels: there other edges begin.
 END_MARGIN = 2.0
-# Two pieces go on in each other over a gap of at most this share of the diagonal,
-LARGEST_GAP = 0.03
-# where their directions differ by no more than this, radians,
+# Two pieces go on in each other over a gap of at most this share of the diagonal.
+LARGEST_GAP_SHARE = 0.03
+# Pieces that go on in each other differ in direction by no more than this, radians.
 LARGEST_TURN = np.deg2rad(4.0)
-# and where each, drawn on straight, passes the other's near end within this, pixels.
-LARGEST_MISS = 1.5
+# Each of them, drawn on straight, passes the other's near end within this, pixels.
+LARGEST_MISS_PX = 1.5
 # So many points of an edge are kept, evenly along it.
 POINTS_KEPT = 24
 
@@ -75,7 +75,7 @@ def edges_of(image: ndarray, photograph: int = 0) -> list[Edge]:
     ends = ends[longest[length[longest] > max(SHORTEST_PIECE * diagonal, 3 * END_MARGIN)]]
     smooth = cv2.GaussianBlur(image, (0, 0), 0.8).astype(np.float32)
     pieces = [points for piece in ends if len(points := _refined(smooth, piece)) >= 4]
-    edges = [Edge(photograph, _thinned(points)) for points in _joined(pieces, LARGEST_GAP * diagonal)]
+    edges = [Edge(photograph, _thinned(points)) for points in _joined(pieces, LARGEST_GAP_SHARE * diagonal)]
     return sorted(edges, key=lambda edge: -edge.length)
 
 
@@ -97,7 +97,7 @@ def _refined(image: ndarray, piece: Float[ndarray, "2 2"]) -> Float[ndarray, "n 
         cv2.INTER_CUBIC,
         borderMode=cv2.BORDER_REPLICATE,
     )
-    grey = cv2.blur(grey, (1, ALONG))
+    grey = cv2.blur(grey, (1, AVERAGED_LOOKS))
     slope = (grey[:, 2:] - grey[:, :-2]) / (2 * PROFILE_STEP)
     slope = slope * np.sign(slope[:, slope.shape[1] // 2].sum() or 1.0)
     peak = slope[:, 1:-1].argmax(1) + 1
@@ -126,8 +126,13 @@ def _joined(pieces: list[ndarray], gap: float) -> list[ndarray]:
     ahead = (apart * leaving[:, None]).sum(-1)
     miss = np.abs(apart[..., 0] * leaving[:, None, 1] - apart[..., 1] * leaving[:, None, 0])
     turn = (leaving[:, None] * -leaving[None]).sum(-1)
-    fits = (distance < gap) & (turn > np.cos(LARGEST_TURN)) & (miss < LARGEST_MISS) & (miss.T < LARGEST_MISS)
-    fits &= (ahead > -LARGEST_MISS) & (ahead.T > -LARGEST_MISS)
+    fits = (
+        (distance < gap)
+        & (turn > np.cos(LARGEST_TURN))
+        & (miss < LARGEST_MISS_PX)
+        & (miss.T < LARGEST_MISS_PX)
+    )
+    fits &= (ahead > -LARGEST_MISS_PX) & (ahead.T > -LARGEST_MISS_PX)
     mate = np.arange(len(places)) ^ 1
     fits[np.arange(len(places)), mate] = False
     partner = np.full(len(places), -1)

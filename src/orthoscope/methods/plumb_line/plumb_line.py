@@ -59,10 +59,10 @@ class LineFormula(NamedTuple):
     centre: bool
 
 
-# Errors along an edge are alike: a deviation is so many times what independent points would make it,
-ALIKE = 3.0
-# and a centre less certain than this share of the diagonal is not known.
-VAGUE = 0.03
+# Errors along an edge are alike: a deviation is so many times what independent points would make it.
+ALIKE_FACTOR = 3.0
+# A centre less certain than this share of the diagonal is not known.
+VAGUE_CENTRE_SHARE = 0.03
 # From the stiffest on.
 FORMULAS = (
     LineFormula("division", False),
@@ -144,8 +144,8 @@ def _score(formula: LineFormula, straight: StraightLens, edges: int) -> float:
     """
     if formula.centre:
         at = [straight.free.index(name) for name in CENTRE if name in straight.free]
-        deviation = ALIKE * np.sqrt(np.diag(straight.covariance)[at].max(initial=0.0))
-        if not at or deviation > VAGUE * np.hypot(*straight.camera.image_size):
+        deviation = ALIKE_FACTOR * np.sqrt(np.diag(straight.covariance)[at].max(initial=0.0))
+        if not at or deviation > VAGUE_CENTRE_SHARE * np.hypot(*straight.camera.image_size):
             return np.inf
     coefficients = [name for name in straight.free if name not in CENTRE]
     return 2 * edges * float(np.log(straight.solution.cost)) + len(coefficients) * float(np.log(2 * edges))

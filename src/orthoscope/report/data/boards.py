@@ -19,7 +19,7 @@ from orthoscope.targets.target import Target
 __all__ = ["board_corners", "boards", "boards_in", "frustum"]
 
 # The drawn frustum opens to at most this half angle, radians; a fisheye's has no flat front.
-WIDEST_ANGLE = np.deg2rad(55.0)
+WIDEST_FRUSTUM_ANGLE = np.deg2rad(55.0)
 
 
 def boards(evaluation: Evaluation) -> dict[str, Any] | str:
@@ -56,5 +56,7 @@ def frustum(camera: Camera, depth: float) -> Float[ndarray, "4 3"]:
     """The four far corners of the pyramid that the frame sees, camera frame."""
     width, height = camera.image_size
     pixels = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]) - 0.5
-    plane = np.clip(camera.intrinsics.to_plane(pixels), -np.tan(WIDEST_ANGLE), np.tan(WIDEST_ANGLE))
+    plane = np.clip(
+        camera.intrinsics.to_plane(pixels), -np.tan(WIDEST_FRUSTUM_ANGLE), np.tan(WIDEST_FRUSTUM_ANGLE)
+    )
     return depth * np.concatenate([plane, np.ones((4, 1))], axis=-1)

@@ -22,7 +22,7 @@ from orthoscope.report.data.rounded import RESIDUAL_UNITS, whole
 __all__ = ["difference", "displacement", "ideal_image", "lens_misfit_data"]
 
 # The frame has about so many cells.
-CELL_COUNT = 1200
+FIELD_CELLS = 1200
 
 
 def displacement(evaluation: Evaluation) -> dict[str, Any] | str:
@@ -69,7 +69,7 @@ def _field(
     field: Callable[[Float[ndarray, "n 2"]], Float[ndarray, "n 2"]],
     empty: str,
 ) -> dict[str, Any] | str:
-    cells = cells_for(image_size, CELL_COUNT)
+    cells = cells_for(image_size, FIELD_CELLS)
     vectors = field(cells.centres.reshape(-1, 2))
     return _cells(cells.columns, cells.rows, vectors) if np.isfinite(vectors).any() else empty
 

@@ -20,18 +20,18 @@ from orthoscope.report.data.rounded import digits
 __all__ = ["along_angles", "angles_shown", "curve", "marks"]
 
 # The curve is looked at in so many directions around the axis.
-DIRECTION_COUNT = 48
+AXIAL_DIRECTIONS = 48
 # The curve is drawn this much farther than the frame's farthest corner.
 BEYOND_RATIO = 1.12
 # The curve has so many samples.
-CURVE_SAMPLES = 120
+DRAWN_CURVE_SAMPLES = 120
 
 
 def curve(evaluation: Evaluation) -> dict[str, Any] | str:
     """Distance from the principal point and radial displacement against the angle from the axis."""
     calibration = evaluation.calibration
     camera = calibration.camera
-    angles = angles_shown(camera, CURVE_SAMPLES)
+    angles = angles_shown(camera, DRAWN_CURVE_SAMPLES)
     if not len(angles):
         return "No pixel of the frame has a ray."
     radius, moved = along_angles(camera, angles)
@@ -64,7 +64,7 @@ def along_angles(
     """For each angle and direction: distance of the image from the principal point, and how much of it the
     lens added.
     """
-    phi = 2 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
+    phi = 2 * np.pi * np.arange(AXIAL_DIRECTIONS) / AXIAL_DIRECTIONS
     across, along = np.sin(angles[:, None]), np.cos(angles[:, None])
     rays = np.stack(np.broadcast_arrays(across * np.cos(phi), across * np.sin(phi), along), axis=-1)
     centre = np.array([camera.intrinsics.cx, camera.intrinsics.cy])

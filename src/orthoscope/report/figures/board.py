@@ -23,7 +23,7 @@ from orthoscope.report.shape import corners_seen
 __all__ = ["target_misfit", "target_shape"]
 
 # Around the corners this share of the board's diagonal is left.
-MARGIN_SHARE = 0.09
+DRAWN_MARGIN_SHARE = 0.09
 # A long arrow has this share of the diagonal.
 LONG_ARROW_SHARE = 0.07
 
@@ -107,7 +107,7 @@ def _board(points: Float[ndarray, "m 3"]) -> tuple[Figure, Axes, float]:
     plane = 1e3 * points[:, :2]
     low, high = plane.min(0), plane.max(0)
     diagonal = max(float(np.hypot(*(high - low))), 1e-9)
-    low, high = low - MARGIN_SHARE * diagonal, high + MARGIN_SHARE * diagonal
+    low, high = low - DRAWN_MARGIN_SHARE * diagonal, high + DRAWN_MARGIN_SHARE * diagonal
     tall = min(max((COLUMN_WIDTH - 1.1) * (high - low)[1] / (high - low)[0], 2.2), 5.2)
     figure = Figure(figsize=(COLUMN_WIDTH, tall + 0.75))
     axes = figure.add_subplot()

@@ -35,7 +35,7 @@ from orthoscope.report.figures.vector_map import vector_map
 __all__ = ["displacement_map", "distortion_curve", "lens_difference"]
 
 # The curve has so many samples.
-CURVE_SAMPLES = 240
+PRINTED_CURVE_SAMPLES = 240
 # What is marked on the curve has these colours.
 MARK_COLOURS = {"seen": ORANGE, "edge": INK, "end": RED}
 
@@ -53,7 +53,7 @@ def distortion_curve(calibration: Calibration) -> Figure:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.25, 1.0))
     above.set_ylabel("distance from principal point (px)")
     below.set(xlabel="angle from the optical axis (°)", ylabel="radial displacement (px)")
-    angles = angles_shown(camera, CURVE_SAMPLES)
+    angles = angles_shown(camera, PRINTED_CURVE_SAMPLES)
     if not len(angles):
         note(above, "no pixel of the frame's border or inside has a ray")
         return figure

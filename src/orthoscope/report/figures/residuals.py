@@ -33,7 +33,7 @@ __all__ = ["lens_misfit", "residual_vectors", "residuals_by_place", "residuals_b
 # With more photographs the axis carries their numbers instead of names.
 NAMED_PHOTOGRAPHS = 60
 # The mean of a cell with fewer corners says nothing.
-FEWEST_CORNERS = 4
+FEWEST_CELL_CORNERS = 4
 
 
 @styled
@@ -73,9 +73,9 @@ def residuals_by_place(evaluation: Evaluation) -> Figure:
     figure, axes = frame_figure(calibration.camera.image_size)
     kind, pixels, residuals = _fairest(evaluation)
     cells = cells_for(calibration.camera.image_size, int(np.clip(len(pixels) / 8, 24, 300)))
-    told = cells.count(pixels) >= FEWEST_CORNERS
+    told = cells.count(pixels) >= FEWEST_CELL_CORNERS
     if not told.any():
-        note(axes, f"no place has {FEWEST_CORNERS} corners")
+        note(axes, f"no place has {FEWEST_CELL_CORNERS} corners")
         return figure
     spread = np.where(told, np.sqrt(cells.mean(pixels, (residuals**2).sum(-1))), np.nan)
     axes.set_facecolor(EMPTY_COLOUR)

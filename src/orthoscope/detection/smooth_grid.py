@@ -1,0 +1,94 @@
+"""Corners that are off where all others foresee them: a board's image is a homography and a smooth rest.
+
+A corner's own row and column say little where it is the last of both, and nothing where its neighbours went
+astray with it. So a homography is laid through all corners, and a polynomial of low order through what it
+leaves, which a lens and a wavy board make; each corner is compared with what the others foresee (the residual
+over one minus its own weight in the fit). The worst is taken out until none is off, and what is then foreseen
+is where those that were taken out ought to be.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from orthoscope.geometry.arrays import Bool, Float, ndarray
+
+__all__ = ["off_smooth_grid"]
+
+# Corners are off by more than so many times the usual residual.
+TIMES_USUAL = 8.0
+# And by at least so many pixels, or this share of a step.
+LEAST_PX, LEAST_STEP_SHARE = 0.6, 0.01
+# In a poor picture, whose noise makes the residuals, they are off beyond so many times the usual one,
+TIMES_NOISE = 3.2
+# and, whatever is usual, beyond so many pixels or this share of a step.
+MOST_PX, MOST_STEP_SHARE = 0.6, 0.03
+# The residual of a doubtful corner counts so many times.
+DOUBTFUL_TIMES = 2.0
+# At most this share of the corners is taken out.
+MOST_OUT_SHARE = 0.3
+# A polynomial's order, and the corners that it needs at least.
+ORDERS = ((5, 45), (4, 32), (3, 22), (2, 12))
+# The same in a poor picture, where a higher order follows noise.
+ORDERS_OF_POOR = ((3, 22), (2, 12), (1, 8))
+
+
+def off_smooth_grid(
+    pixels: Float[ndarray, "m 2"],
+    places: Float[ndarray, "m 2"],
+    step: float,
+    *,
+    doubtful: Bool[ndarray, " m"],
+    poor: bool,
+) -> tuple[Bool[ndarray, " m"], Float[ndarray, "m 2"], float]:
+    """Which corners are off, where the others foresee every one, and how far from there is off, pixels.
+
+    Args:
+        pixels: the corners.
+        places: column and row of each in the lattice.
+        step: from a corner to the next, pixels.
+        doubtful: which are off sooner, by half of that; in a good picture only these can be.
+        poor: whether the picture's noise, not lens or board, makes the residuals.
+    """
+    none = np.zeros(len(pixels), dtype=bool), pixels.copy(), np.inf
+    reach = min(np.ptp(places, axis=0)) - 1
+    orders = ORDERS_OF_POOR if poor else ORDERS
+    order = next((order for order, needed in orders if len(pixels) >= needed and reach >= order), None)
+    if order is None:
+        return none
+    terms, off, foreseen, limit = _terms(places, order), none[0].copy(), pixels, np.inf
+    while off.sum() <= MOST_OUT_SHARE * len(off):
+        fitted, weight = _fitted(pixels, places, terms, ~off)
+        if fitted is None:
+            return none
+        foreseen = np.where(off[:, None], fitted, pixels + (fitted - pixels) / (1.0 - weight)[:, None])
+        residual = np.hypot(*(foreseen - pixels).T)
+        usual = float(np.median(residual[~off]))
+        limit = max((TIMES_NOISE if poor else TIMES_USUAL) * usual, LEAST_PX, LEAST_STEP_SHARE * step)
+        limit = min(limit, max(MOST_PX, MOST_STEP_SHARE * step)) if poor else limit
+        counted = np.where(off, 0.0, residual * np.where(doubtful, DOUBTFUL_TIMES, float(poor)))
+        if counted.max() <= limit:
+            break
+        off[counted.argmax()] = True
+    return off, foreseen, limit
+
+
+def _terms(places: Float[ndarray, "m 2"], order: int) -> Float[ndarray, "m t"]:
+    x, y = (2.0 * (places - places.min(0)) / np.ptp(places, axis=0) - 1.0).T
+    return np.stack([x**i * y**j for i in range(order + 1) for j in range(order + 1 - i)], axis=1)
+
+
+def _fitted(
+    pixels: ndarray, places: ndarray, terms: ndarray, used: ndarray
+) -> tuple[Float[ndarray, "m 2"] | None, Float[ndarray, " m"]]:
+    """Where homography and polynomial through the used corners have all of them, and each one's weight."""
+    homography, _ = cv2.findHomography(places[used], pixels[used], 0)
+    if homography is None:
+        return None, np.zeros(len(pixels))
+    flat = cv2.perspectiveTransform(places[None].astype(float), homography)[0]
+    basis = np.linalg.qr(terms[used])[0]
+    coefficients = np.linalg.lstsq(terms[used], (pixels - flat)[used], rcond=None)[0]
+    weight = np.zeros(len(pixels))
+    weight[used] = np.minimum((basis**2).sum(1), 0.9)
+    return flat + terms @ coefficients, weight

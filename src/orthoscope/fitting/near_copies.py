@@ -1,0 +1,69 @@
+"""Photographs that are the same photograph again: a burst, a tripod, frames of a film.
+
+Copies agree with each other whatever is true, so no copy may foretell another: those that are near-copies are
+left out together (leave_one_out.py) and count as one photograph.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orthoscope.geometry.arrays import Int, ndarray
+from orthoscope.targets.detections import Detections
+
+__all__ = ["near_copies", "summed_over"]
+
+# Views are the same photograph again where most of their corners are apart by less, pixels in an image of
+# this width; in a larger one by more.
+COPIED_PX = 1.0
+USUAL_WIDTH = 1000.0
+# With fewer corners in common two views cannot be compared.
+FEWEST_COMMON = 4
+# A few corners tell first which views may be copies at all.
+FIRST_CORNERS = 16
+
+
+def near_copies(detections: Detections) -> Int[ndarray, " m"]:
+    """Which photograph each view is: the number, from 0, of the first view that it copies, counted without
+    copies.
+    """
+    near = COPIED_PX * max(1.0, max(detections.image_size) / USUAL_WIDTH)
+    views, corners = len(detections.views), len(detections.target.points)
+    tables = np.full((views, corners, 2), np.nan)
+    for table, view in zip(tables, detections.views, strict=True):
+        table[view.ids] = view.pixels
+    first = np.unique(np.linspace(0, corners - 1, FIRST_CORNERS).round().astype(int))
+    number, kept = np.zeros(views, dtype=np.int64), np.zeros(views, dtype=np.int64)
+    count = 0
+    for i in range(views):
+        gaps = np.abs(tables[kept[:count, None], first] - tables[i, first]).max(-1)
+        # common corners that are all far apart rule a copy out
+        perhaps = np.flatnonzero((gaps < near).any(1) | np.isnan(gaps).all(1))
+        same = [k for k in perhaps if _is_copy(tables[kept[k]], tables[i], near)]
+        if same:
+            number[i] = same[0]
+        else:
+            number[i], kept[count] = count, i
+            count += 1
+    return number
+
+
+def _is_copy(one: ndarray, other: ndarray, near: float) -> bool:
+    apart = np.hypot(*(one - other).T)
+    common = np.isfinite(apart)
+    return bool(common.sum() >= FEWEST_COMMON and np.median(apart[common]) < near)
+
+
+def summed_over(groups: Int[ndarray, " m"], values: ndarray) -> ndarray:
+    """For each view the sum over the views that are the same photograph.
+
+    Args:
+        groups: as `near_copies` gives them.
+        values: (m, ...).
+    """
+    count = int(groups.max(initial=-1)) + 1
+    if count == len(groups):
+        return values
+    sums = np.zeros((count, *values.shape[1:]))
+    np.add.at(sums, groups, values)
+    return sums[groups]
