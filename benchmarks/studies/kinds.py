@@ -139,8 +139,8 @@ def _told(spec: str, count: int) -> str:
     every = sum(len(truth) for _, truth in shown)
     return (
         f"| `{spec}` | **{_rms(errors):.3f} px** (worst {max(errors, default=np.nan):.2f}),"
-        f" {ours} of {every}, {1e3 * spent / count:.0f} ms | {_rms(their_errors):.3f} px, {theirs} of {every},"
-        f" {1e3 * their_time / count:.0f} ms |"
+        f" {ours} of {every}, {1e3 * spent / count:.0f} ms |"
+        f" {_rms(their_errors):.3f} px, {theirs} of {every}, {1e3 * their_time / count:.0f} ms |"
     )
 
 
