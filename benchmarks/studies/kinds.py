@@ -5,9 +5,9 @@
 
 Photographs are 1280x960, lens `brown` (k1 = -.25), blur .7 px, noise 2 grey levels, tilts to 52 degrees.
 Errors are rms distances from the truth over all corners found, of discs from the centre of the outline;
-beside them stand OpenCV's finders on the same pictures. Times are of the process, a photograph in the mean. A camera is
-`fccm` with the lens that took the photographs; its error is the largest of fx, fy, cx and cy, and how many of
-their standard errors it is.
+beside them stand OpenCV's finders on the same pictures. Times are of the process, a photograph in the mean. A
+camera is `fccm` with the lens that took the photographs; its error is the largest of fx, fy, cx and cy, and
+how many of their standard errors it is.
 """
 
 from __future__ import annotations
@@ -138,9 +138,9 @@ def _told(spec: str, count: int) -> str:
             theirs, their_errors = theirs + len(off), [*their_errors, *off]
     every = sum(len(truth) for _, truth in shown)
     return (
-        f"| `{spec}` | **{_rms(errors):.3f} px** (worst {max(errors, default=np.nan):.2f}), {ours} of {every},"
-        f" {1e3 * spent / count:.0f} ms | {_rms(their_errors):.3f} px, {theirs} of {every},"
-        f" {1e3 * their_time / count:.0f} ms |"
+        f"| `{spec}` | **{_rms(errors):.3f} px** (worst {max(errors, default=np.nan):.2f}),"
+        f" {ours} of {every}, {1e3 * spent / count:.0f} ms |"
+        f" {_rms(their_errors):.3f} px, {theirs} of {every}, {1e3 * their_time / count:.0f} ms |"
     )
 
 
