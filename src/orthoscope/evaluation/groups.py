@@ -11,7 +11,7 @@ quadratic is lower. Two questions, and either makes two groups of photographs:
 2. *Do two cameras foresee the photographs far better?*  Groupings of the linear step are refined by a fit for
    each group, each view going to the camera that sees it with less error (by leave-one-out in its own group),
    until nothing changes. Photographs are of two cameras where these foresee them with less than APART_SHARE
-   of the error of one for all.
+   of the error of one for all, and each agrees on its camera by itself.
 
 The first finds what is small beside the noise, the second what is too large to be linear.
 S. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28(2), 1982 (k-means, here on
@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.evaluation.disagreement import Disagreement, changes_of, spread_of
+from orthoscope.evaluation.disagreement import Disagreement, changes_of, disagreement, spread_of
 from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of, leave_one_out
 from orthoscope.fitting.linearised import Linearised
@@ -38,10 +38,9 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Groups", "two_groups"]
 
-# Two cameras leave less than this share of the error of one camera for all.
-APART_SHARE = 0.7
-# Where less than this share of one camera's error is left no other start is tried.
-BEYOND_DOUBT_SHARE = 0.5
+# Two cameras leave less than this share of the error of one camera for all: the halves of what is merely spread
+# leave .5 of it where the spread is even, .6 where it is normal.
+APART_SHARE = 0.45
 # The logarithm of the likelihood ratio, of two values against a spread, is at least this.
 LEAST_LOG_RATIO = 2.5
 # A view with less than this for either group is in none.
@@ -57,7 +56,7 @@ REFINING_ROUNDS = 6
 # K-means, and the likelihoods, have so many rounds.
 SETTLING_ROUNDS = 60
 # So many groupings are refined.
-REFINED_GROUPINGS = 4
+REFINED_GROUPINGS = 6
 
 
 class Groups(NamedTuple):
@@ -108,15 +107,14 @@ def two_groups(
     noise = fit.noise * max(1.0, found.wishes.tau)
     groupings = _groupings(_quadratics(fit, noise, ("k1",)))
     explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
-    joint, best = float(np.nansum(whole.squares)), (np.inf, None)
-    for _, start in groupings[:REFINED_GROUPINGS] if explained > LEAST_EXPLAINED_SHARE else ():
-        refined = _refined(detections, start, base=base)
-        if refined is not None and refined[0] < best[0]:
-            best = refined
-        if np.sqrt(best[0] / joint) < BEYOND_DOUBT_SHARE:
-            break
-    squares, second = best
+    joint = float(np.nansum(whole.squares))
+    starts = (
+        [start for _, start in groupings[:REFINED_GROUPINGS]] if explained > LEAST_EXPLAINED_SHARE else []
+    )
+    squares, second = _best_refined(detections, starts, base=base)
     if second is not None and np.sqrt(squares / joint) < APART_SHARE:
+        if not _agree_by_themselves(detections, second, base=base):
+            return None
         return _named(second, np.ones(len(second), dtype=bool))
     return None if found.kind == "shutter" else _two_values(_quadratics(fit, noise))
 
@@ -201,6 +199,41 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
     return float(
         (0.5 * (say.score * mean).sum(1) - 0.5 * np.linalg.slogdet(np.eye(c) + spread @ say.told)[1]).sum()
     )
+
+
+def _best_refined(
+    detections: Detections, starts: list[Bool[ndarray, " m"]], *, base: str
+) -> tuple[float, Bool[ndarray, " m"] | None]:
+    """The refined grouping with the least squares; no more starts where two have come to it.
+
+    A grouping in which some photographs have changed places can be far better than one camera for all and
+    still be the wrong one: refining moves single views, and does not undo a swap.
+    """
+    best: tuple[float, ndarray | None] = (np.inf, None)
+    for start in starts:
+        refined = _refined(detections, start, base=base)
+        if refined is None:
+            continue
+        if best[1] is not None and _same_grouping(refined[1], best[1]):
+            break
+        if refined[0] < best[0]:
+            best = refined
+    return best
+
+
+def _agree_by_themselves(detections: Detections, second: Bool[ndarray, " m"], *, base: str) -> bool:
+    """Whether each group agrees on one camera: halves of a zoom in many steps, or of photographs by a rolling
+    shutter, are better than the whole, but are no cameras.
+    """
+    for group in (~second, second):
+        part = detections.only(np.flatnonzero(group))
+        if disagreement(linearised(_fit(part, base=base)), part).certain:
+            return False
+    return True
+
+
+def _same_grouping(one: Bool[ndarray, " m"], other: Bool[ndarray, " m"]) -> bool:
+    return bool((one == other).all() or (one != other).all())
 
 
 def _refined(
