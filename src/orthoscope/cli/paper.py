@@ -1,6 +1,6 @@
 """`orthoscope paper`: the paper's section 4, whole: one page and CSV files.
 
-The floor of the command line.  Its trials run in processes, each of which computes with one thread.
+Its trials run in processes, each of which computes with one thread.
 """
 
 from __future__ import annotations
