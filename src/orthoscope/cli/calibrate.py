@@ -29,6 +29,7 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @click.command(epilog=EXAMPLE)
 @options.photos
 @options.target
+@options.topic
 @options.lens
 @options.method
 @options.shape
@@ -93,6 +94,7 @@ def calibrate_into(
     *,
     target: str | None,
     out: Path,
+    topic: str | None = None,
     lens: str = "auto",
     method: str = "decoupled",
     shape: str | None = None,
@@ -115,18 +117,20 @@ def calibrate_into(
     as_json: bool = False,
 ) -> Any:
     """The main job; prints the summary and returns the evaluation."""
-    from orthoscope.cli.executors import processes, threads
-    from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.judged import EVALUATION_NAME
-    from orthoscope.cli.method_settings import settings_from
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import evaluation_lines
-    from orthoscope.evaluation.evaluate import evaluate
-    from orthoscope.files.whole_files import check_folder
-    from orthoscope.formats.own.json import save, text_of
-    from orthoscope.methods import calibrate as run
-    from orthoscope.methods import settings_of
-    from orthoscope.targets.left_out import left_out
+
+    with bar("starting"):  # loading takes most of the first half second
+        from orthoscope.cli.executors import processes, threads
+        from orthoscope.cli.inputs import detections_from
+        from orthoscope.cli.judged import EVALUATION_NAME
+        from orthoscope.cli.method_settings import settings_from
+        from orthoscope.cli.summary import evaluation_lines
+        from orthoscope.evaluation.evaluate import evaluate
+        from orthoscope.files.whole_files import check_folder
+        from orthoscope.formats.own.json import save, text_of
+        from orthoscope.methods import calibrate as run
+        from orthoscope.methods import settings_of
+        from orthoscope.targets.left_out import left_out
 
     check_folder(out)
     lenses = _lenses_of(export)
@@ -143,7 +147,7 @@ def calibrate_into(
     given = {name: value for name, value in given.items() if value is not None} | settings_from(more)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         detections, files = detections_from(
-            photos, target, image_size=image_size, executor=executor, progress=progress
+            photos, target, image_size=image_size, executor=executor, progress=progress, topic=topic
         )
     for remark in detections.remarks:
         tell(f"remark     {remark.image}: {remark.words}", err=True)
@@ -153,7 +157,7 @@ def calibrate_into(
     with bar("calibrating") as progress:
         told = {"judging": progress} if "judging" in settings_of(method) else {}
         calibration = run(detections, method=method, **given, **told)
-    with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
+    with processes(jobs if folds else jobs or 1, cluster) as executor, bar("evaluating") as progress:
         evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
     for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION_NAME)):
         save(thing, out / name)

@@ -97,7 +97,7 @@ def compare(
         detections, _ = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress
         )
-    with processes(jobs or 1, cluster) as executor, bar("comparing") as progress:
+    with processes(jobs, cluster) as executor, bar("comparing") as progress:
         comparison = judge(detections, entries, folds=folds, executor=executor, progress=progress)
     texts = {
         "comparison.json": text_of(comparison),

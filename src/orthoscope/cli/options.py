@@ -35,6 +35,7 @@ __all__ = [
     "skew",
     "target",
     "tool_settings",
+    "topic",
     "verbose",
 ]
 
@@ -164,6 +165,9 @@ target: Decorator = click.option(
         " all kinds. auto says which it seems to be."
     ),
 )
+topic: Decorator = click.option(
+    "--topic", help="Of a ROS bag or MCAP file with several topics that have pictures: which one."
+)
 image_size: Decorator = click.option(
     "--image-size",
     type=SIZE,
@@ -242,8 +246,8 @@ jobs: Decorator = click.option(
     "--jobs",
     type=click.IntRange(1),
     help=(
-        "How much is done at the same time: photographs, by default as many as there are cores; folds, by"
-        " default one."
+        "How much is done at the same time: photographs, and folds where they are asked for; by default as many"
+        " as there are cores."
     ),
 )
 cluster: Decorator = click.option(

@@ -103,7 +103,7 @@ def test_each_error_is_that_of_the_judge_for_the_same_folds(comparison):
     assert best.rms_px == fccm(TEN, lens="brown").rms_px
     assert best.rms_px < best.held_out_px
     assert (best.parameters, best.lens, best.shape) == (9.0, "brown", "flat")
-    assert_allclose(best.nce, evaluate(fccm(TEN, lens="brown")).nce)
+    assert_allclose(best.nce, evaluate(fccm(TEN, lens="brown"), folds=5).nce)
 
 
 def test_seconds_are_those_of_one_calibration(comparison):
