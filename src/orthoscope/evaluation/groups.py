@@ -38,8 +38,8 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Groups", "two_groups"]
 
-# Two cameras leave less than this share of the error of one camera for all: the halves of what is merely spread
-# leave .5 of it where the spread is even, .6 where it is normal.
+# Two cameras leave less than this share of the error of one camera for all: the halves of what is merely
+# spread leave .5 of it where the spread is even, .6 where it is normal.
 APART_SHARE = 0.45
 # The logarithm of the likelihood ratio, of two values against a spread, is at least this.
 LEAST_LOG_RATIO = 2.5
@@ -98,7 +98,7 @@ def two_groups(
     Args:
         fit: of all views, every corner free and a free lens.
         found: how they disagree.
-        whole: each view left out of the fit.
+        whole: each view left out of the fit; one by one, since copies may be of two cameras.
         detections: of the fit.
         base: the formula under the free lens.
     """
