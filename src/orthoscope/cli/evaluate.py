@@ -16,8 +16,8 @@ Examples:
   $ orthoscope evaluate camera/calibration.json
   $ orthoscope evaluate camera/calibration.json --on other_photos/
   $ orthoscope evaluate camera_info.yaml --on photos/ --target chessboard:9x6:25mm
-  verdict    Good: the camera that these photographs give by themselves, which they know to 0.21 px, is 0.04 px
-  away.
+  verdict    Good: the camera that these photographs give by themselves, which they know to 0.2 px, is
+             0.04 px away.
   off by     0.174 px per corner, the camera fixed, poses fitted
   photos     14 used, 0 set aside; 756 corners
 
