@@ -20,16 +20,18 @@ quadratics).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from orthoscope.evaluation.disagreement import Disagreement, changes_of, spread_of
-from orthoscope.fitting.calibration import residuals_of
+from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
+from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.fccm import fit_flat
@@ -109,8 +111,10 @@ def two_groups(
     groupings = _groupings(_quadratics(fit, noise, ("k1",)))
     explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
     joint, best = float(np.nansum(whole.squares)), (np.inf, None)
-    for _, start in groupings[:REFINED_GROUPINGS] if explained > LEAST_EXPLAINED_SHARE else ():
-        refined = _refined(detections, start, base=base)
+    wanted = groupings[:REFINED_GROUPINGS] if explained > LEAST_EXPLAINED_SHARE else []
+    together = fit_flat(detections, lens=base) if wanted else None
+    for _, start in wanted:
+        refined = _refined(together, start) if together else None
         if refined is not None and refined[0] < best[0]:
             best = refined
         if np.sqrt(best[0] / joint) < BEYOND_DOUBT_SHARE:
@@ -203,11 +207,12 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
     )
 
 
-def _refined(
-    detections: Detections, second: Bool[ndarray, " m"], *, base: str
-) -> tuple[float, Bool[ndarray, " m"]] | None:
+def _refined(together: Calibration, second: Bool[ndarray, " m"]) -> tuple[float, Bool[ndarray, " m"]] | None:
     """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no
     camera.
+
+    Args:
+        together: one camera for all, with a flat target: what each group's fit starts from.
     """
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
@@ -219,9 +224,7 @@ def _refined(
             break
         seen.add(second.tobytes())
         try:
-            squares = np.stack(
-                [_squares(detections, np.flatnonzero(group), base=base) for group in (~second, second)]
-            )
+            squares = np.stack([_squares(together, np.flatnonzero(group)) for group in (~second, second)])
         except CalibrationError:
             break
         total = float(np.where(second, squares[1], squares[0]).sum())
@@ -231,9 +234,9 @@ def _refined(
     return best
 
 
-def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndarray, " m"]:
+def _squares(together: Calibration, group: ndarray) -> Float[ndarray, " m"]:
     """Squared error of each view by a group's camera: left out where it is of the group."""
-    fit = _fit(detections.only(group), base=base)
+    detections, fit = together.detections, _fit(together, group)
     shape, camera = fit.shape, fit.estimate.camera
     poses = resect(camera, detections, shape=shape)
     squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
@@ -241,8 +244,13 @@ def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndar
     return squares
 
 
-def _fit(detections: Detections, *, base: str) -> StepOneFit:
-    return fit_step_one(fit_flat(detections, lens=base), shape="free", first_lens=FREE)
+def _fit(together: Calibration, group: ndarray) -> StepOneFit:
+    start = replace(
+        together,
+        detections=together.detections.only(group),
+        camera_from_target=tuple(together.camera_from_target[i] for i in group),
+    )
+    return fit_step_one(start, shape="free", first_lens=FREE, tolerance=COMPARED_TOLERANCE)
 
 
 def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:
