@@ -29,6 +29,7 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
 @click.command(epilog=EXAMPLE)
 @options.photos
 @options.target
+@options.topic
 @options.lens
 @options.method
 @options.shape
@@ -93,6 +94,7 @@ def calibrate_into(
     *,
     target: str | None,
     out: Path,
+    topic: str | None = None,
     lens: str = "auto",
     method: str = "decoupled",
     shape: str | None = None,
@@ -145,7 +147,7 @@ def calibrate_into(
     given = {name: value for name, value in given.items() if value is not None} | settings_from(more)
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
         detections, files = detections_from(
-            photos, target, image_size=image_size, executor=executor, progress=progress
+            photos, target, image_size=image_size, executor=executor, progress=progress, topic=topic
         )
     for remark in detections.remarks:
         tell(f"remark     {remark.image}: {remark.words}", err=True)

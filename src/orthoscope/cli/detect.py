@@ -23,6 +23,7 @@ Example:
 @click.command(epilog=EXAMPLE)
 @options.photos
 @options.target
+@options.topic
 @options.image_size
 @options.jobs
 @click.option(
@@ -43,6 +44,7 @@ Example:
 def detect(
     photos: tuple[str, ...],
     target: str | None,
+    topic: str | None,
     image_size: tuple[int, int] | None,
     jobs: int | None,
     max_megapixels: float | None,
@@ -72,6 +74,7 @@ def detect(
             executor=executor,
             progress=progress,
             most_megapixels=max_megapixels,
+            topic=topic,
         )
     save(detections, out)
     width, height = detections.image_size

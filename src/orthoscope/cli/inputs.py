@@ -32,6 +32,7 @@ def detections_from(
     executor: Executor | None = None,
     progress: Callable[[int, int, str], None] | None = None,
     most_megapixels: float | None = None,
+    topic: str | None = None,
 ) -> tuple[Detections, dict[str, Path]]:
     """Detections, and where the photograph of each name is (empty where corners were found before).
 
@@ -63,13 +64,15 @@ def detections_from(
             )
         return read_vnl(paths[0], target, image_size), {}
     from orthoscope.detection.detect import detect
-    from orthoscope.files.films import FILMS
     from orthoscope.files.images import MOST_MEGAPIXELS, names_of, passed_over, photographs
+    from orthoscope.files.pictures import MOVING
 
-    files = photographs(paths, also=FILMS)
+    files = photographs(paths, also=MOVING)
     most = MOST_MEGAPIXELS if most_megapixels is None else most_megapixels
-    found = detect(files, target, jobs=jobs, executor=executor, progress=progress, most_megapixels=most)
-    if others := passed_over(paths, also=FILMS):
+    found = detect(
+        files, target, jobs=jobs, executor=executor, progress=progress, most_megapixels=most, topic=topic
+    )
+    if others := passed_over(paths, also=MOVING):
         tell(f"passed over {', '.join(f'{count} {end}' for end, count in others.items())}", err=True)
     named = dict(zip(names_of(files), files, strict=True))
     return found, named | {

@@ -58,11 +58,13 @@ def lines_of(found: OnOthers, *, verbose: bool = False) -> list[str]:
     Args:
         verbose: the photographs that were set aside, and NCE, as well.
     """
+    from orthoscope.geometry.numbers import pixels
+
     error = found.error
     aside = error.detections.set_aside
     lines = [
         f"verdict    {_verdict(found)}",
-        f"off by     {error.rms_px:.3f} px per corner, the camera fixed, poses fitted",
+        f"off by     {pixels(error.rms_px)} px per corner, the camera fixed, poses fitted",
         f"photos     {len(error.detections.views)} used, {len(aside)} set aside; {error.detections.corners} corners",
     ]
     if found.board:
@@ -113,11 +115,13 @@ def _verdict(found: OnOthers) -> str:
 
 def _board_line(board: SameBoard) -> str:
     """Whether it is the board that the camera was calibrated with, and how that shows."""
+    from orthoscope.geometry.numbers import pixels
+
     which = "the one of the calibration" if board.same else "another than that of the calibration"
     taken = (
         "the shape found there is used"
         if board.same
         else "its corners are taken to be where they are said to be"
     )
-    figures = f"{board.learnt_px:.3f} px with the shape found there, {board.said_px:.3f} without"
+    figures = f"{pixels(board.learnt_px)} px with the shape found there, {pixels(board.said_px)} without"
     return f"{'' if board.sure else 'perhaps '}{which}: {figures}; {taken}"

@@ -35,6 +35,7 @@ __all__ = [
     "skew",
     "target",
     "tool_settings",
+    "topic",
     "verbose",
 ]
 
@@ -163,6 +164,9 @@ target: Decorator = click.option(
         " aprilgrid:COLUMNSxROWS:TAG:SPACING, counting tags; or a target.yaml of Kalibr; docs/targets.md has"
         " all kinds. auto says which it seems to be."
     ),
+)
+topic: Decorator = click.option(
+    "--topic", help="Of a ROS bag or MCAP file with several topics that have pictures: which one."
 )
 image_size: Decorator = click.option(
     "--image-size",

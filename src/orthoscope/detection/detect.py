@@ -57,6 +57,7 @@ def detect(
     executor: Executor | None = None,
     progress: Callable[[int, int, str], None] | None = None,
     most_megapixels: float = MOST_MEGAPIXELS,
+    topic: str | None = None,
 ) -> Detections:
     """Find the target in photographs.
 
@@ -67,13 +68,14 @@ def detect(
         executor: of one's own, instead of jobs.
         progress: called with (done, total, name).
         most_megapixels: larger photographs are set aside unread.
+        topic: of a ROS bag with several that have pictures.
     Raises:
         InputError: photographs or target are wrong.
         CalibrationError: no photograph shows the target.
     """
     target = parse_target(target) if isinstance(target, str) else target
     check_can_be_seen(target)
-    given = pictures(photographs)
+    given = pictures(photographs, topic=topic)
     names = [picture.name for picture in given]
     looks: list[_Look] = []
     with nullcontext(executor) if executor else ThreadPoolExecutor(jobs or os.cpu_count()) as run:

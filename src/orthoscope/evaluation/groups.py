@@ -42,8 +42,6 @@ __all__ = ["Groups", "two_groups"]
 
 # Two cameras leave less than this share of the error of one camera for all.
 APART_SHARE = 0.7
-# Where less than this share of one camera's error is left no other start is tried.
-BEYOND_DOUBT_SHARE = 0.5
 # The logarithm of the likelihood ratio, of two values against a spread, is at least this.
 LEAST_LOG_RATIO = 2.5
 # A view with less than this for either group is in none.
@@ -101,7 +99,7 @@ def two_groups(
     Args:
         fit: of all views, every corner free and a free lens.
         found: how they disagree.
-        whole: each view left out of the fit.
+        whole: each view left out of the fit; one by one, since copies may be of two cameras.
         detections: of the fit.
         base: the formula under the free lens.
     """
@@ -115,10 +113,12 @@ def two_groups(
     together = fit_flat(detections, lens=base) if wanted else None
     for _, start in wanted:
         refined = _refined(together, start) if together else None
-        if refined is not None and refined[0] < best[0]:
+        if refined is None:
+            continue
+        if best[1] is not None and len(np.unique(refined[1] ^ best[1])) == 1:
+            break  # another start ends where the best one did
+        if refined[0] < best[0]:
             best = refined
-        if np.sqrt(best[0] / joint) < BEYOND_DOUBT_SHARE:
-            break
     squares, second = best
     if second is not None and np.sqrt(squares / joint) < APART_SHARE:
         return _named(second, np.ones(len(second), dtype=bool))

@@ -22,6 +22,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from orthoscope.files.decoders import DECODED_SUFFIXES, RAW_SUFFIXES, decoded
 from orthoscope.files.image_headers import size_in_header, without_turning
 from orthoscope.files.whole_files import read_bytes, write_bytes
 from orthoscope.geometry.arrays import InputError, ndarray
@@ -41,6 +42,7 @@ __all__ = [
 ]
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".gif")
+READ_SUFFIXES = (*SUFFIXES, *DECODED_SUFFIXES)
 # Files with these suffixes may hold several pictures.
 PAGED_SUFFIXES = (".tif", ".tiff", ".webp", ".gif")
 # A file that says it holds more is hardly a photograph.
@@ -77,7 +79,7 @@ def photographs(paths: Path_ | Iterable[Path_], *, also: tuple[str, ...] = ()) -
         )
     found: dict[Path, Path] = {}
     for path in given:
-        for file in _expanded(Path(path), (*SUFFIXES, *also)):
+        for file in _expanded(Path(path), (*READ_SUFFIXES, *also)):
             found.setdefault(file.resolve(), file)
     return list(found.values())
 
@@ -86,12 +88,11 @@ def passed_over(paths: Path_ | Iterable[Path_], *, also: tuple[str, ...] = ()) -
     """How many files of each ending the named folders hold that are no photographs."""
     given = [paths] if isinstance(paths, str | PathLike) else list(paths)
     folders = {Path(path).resolve() for path in given if Path(path).is_dir()}
-    others = [
-        file.suffix.lower() or "(none)"
-        for folder in folders
-        for file in folder.iterdir()
-        if file.is_file() and not file.name.startswith(".") and file.suffix.lower() not in (*SUFFIXES, *also)
-    ]
+    others: list[str] = []
+    for folder in folders:
+        files = [file for file in folder.iterdir() if file.is_file() and not file.name.startswith(".")]
+        taken = _photographs_in(folder, (*READ_SUFFIXES, *also))
+        others += [file.suffix.lower() or "(none)" for file in set(files) - set(taken)]
     return dict(sorted(Counter(others).items()))
 
 
@@ -120,6 +121,13 @@ def read_image(
     Raises:
         InputError: the file is missing, empty, no image, cut off or too large.
     """
+    suffix = Path(path).suffix.lower()
+    if suffix in DECODED_SUFFIXES:
+        try:
+            image = decoded(_content(Path(path), most_megapixels), suffix)
+        except InputError as error:
+            raise error if str(path) in str(error) else InputError(f"{path}: {error}") from error
+        return to_grey(image) if grey else _to_8_bits(image)
     content = without_turning(_content(Path(path), most_megapixels))
     flags = (cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) | cv2.IMREAD_ANYDEPTH
     flags |= cv2.IMREAD_IGNORE_ORIENTATION
@@ -233,7 +241,7 @@ def write_image(path: Path_, image: ndarray) -> None:
 def _expanded(path: Path, suffixes: tuple[str, ...]) -> list[Path]:
     """The files that one path means."""
     if path.is_dir():
-        files = [file for file in path.iterdir() if _is_photograph(file, suffixes)]
+        files = _photographs_in(path, suffixes)
         if not files:
             raise InputError(
                 f"folder {path} holds no photograph; expected files ending in {', '.join(SUFFIXES)}. Name the"
@@ -255,6 +263,12 @@ def _expanded(path: Path, suffixes: tuple[str, ...]) -> list[Path]:
             " some."
         )
     return sorted(files, key=_natural)
+
+
+def _photographs_in(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    """The photographs of a folder; raw ones where there are no others."""
+    files = [file for file in folder.iterdir() if _is_photograph(file, suffixes)]
+    return [file for file in files if file.suffix.lower() not in RAW_SUFFIXES] or files
 
 
 def _is_photograph(file: Path, suffixes: tuple[str, ...]) -> bool:

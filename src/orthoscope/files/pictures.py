@@ -14,11 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from orthoscope.files.films import FILMS, frames_of
+from orthoscope.files.bags import BAGS, pictures_in_bag
+from orthoscope.files.films import FILMS, frames_of, worth_looking_at
 from orthoscope.files.images import names_of, pages_in, photographs, read_image, to_grey
 from orthoscope.geometry.arrays import InputError, ndarray
 
-__all__ = ["Given", "Picture", "pictures"]
+__all__ = ["MOVING", "Given", "Picture", "pictures"]
+
+# Files of many frames, of which some are looked at.
+MOVING = (*FILMS, *BAGS)
 
 Given = str | PathLike[str] | ndarray | Iterable[str | PathLike[str] | ndarray] | Mapping[str, ndarray]
 
@@ -48,11 +52,12 @@ class Picture:
         return to_grey(self.source)
 
 
-def pictures(given: Given) -> list[Picture]:
-    """Every picture of files, folders, globs, films and arrays.
+def pictures(given: Given, *, topic: str | None = None) -> list[Picture]:
+    """Every picture of files, folders, globs, films, bags and arrays.
 
     Args:
         given: one of these or several; arrays by name, or numbered as they come.
+        topic: of a bag with several that have pictures.
     Raises:
         InputError: a path leads to no picture, or an array is none.
     """
@@ -65,15 +70,17 @@ def pictures(given: Given) -> list[Picture]:
     paths = [entry for entry in entries if not isinstance(entry, ndarray)]
     digits = max(2, len(str(len(arrays))))
     found = [Picture(f"picture{i:0{digits}d}", _checked(array)) for i, array in enumerate(arrays, 1)]
-    files = photographs(paths, also=FILMS) if paths or not arrays else []
+    files = photographs(paths, also=MOVING) if paths or not arrays else []
     for name, file in zip(names_of(files), files, strict=True):
-        found += _of_file(name, file)
+        found += _of_file(name, file, topic)
     return found
 
 
-def _of_file(name: str, file: Path) -> list[Picture]:
-    if file.suffix.lower() in FILMS:
-        return [Picture(f"{name}@{frame.seconds:.3f}s", frame.picture) for frame in frames_of(file)]
+def _of_file(name: str, file: Path, topic: str | None) -> list[Picture]:
+    suffix = file.suffix.lower()
+    if suffix in MOVING:
+        frames = frames_of(file) if suffix in FILMS else worth_looking_at(pictures_in_bag(file, topic))
+        return [Picture(f"{name}@{frame.seconds:.3f}s", frame.picture) for frame in frames]
     pages = pages_in(file)
     if pages < 2:
         return [Picture(name, file)]

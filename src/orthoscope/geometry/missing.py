@@ -15,6 +15,10 @@ SEPARATE = {
     " either"
     " -headless). Install one: pip install 'orthoscope[opencv]', or [opencv-contrib].",
     "av": "PyAV is not installed; films with sound need it. Install it: pip install 'orthoscope[video]'.",
+    "pillow_heif": "pillow-heif is not installed; HEIC photographs need it. Install it: pip install"
+    " 'orthoscope[heic]'.",
+    "rawpy": "rawpy is not installed; raw photographs need it. Install it: pip install 'orthoscope[raw]'.",
+    "rosbags": "rosbags is not installed; ROS bags need it. Install it: pip install 'orthoscope[ros]'.",
     "distributed": "Dask is not installed; --cluster needs it. Install it: pip install"
     " 'orthoscope[cluster]'.",
 }

@@ -147,9 +147,18 @@ def _black_cells(sides: list[ndarray], boxes: Float[ndarray, "k 2 2"]) -> Float[
 
 def _between(sides: ndarray, values: ndarray) -> tuple[Int[ndarray, "*n"], Float[ndarray, "*n"]]:
     """Between which two sides each value is, and how far from the first to the second, 0 to 1."""
+    if _are_even(sides):  # of a chessboard all are, and no search is needed
+        at = (values - sides[0]) / (sides[1] - sides[0])
+        cell = np.clip(at.astype(np.int64), 0, len(sides) - 2)
+        return cell, np.clip(at - cell, 0.0, 1.0)
     cell = np.clip(np.searchsorted(sides, values, "right") - 1, 0, len(sides) - 2)
     first = sides[cell]
     return cell, np.clip((values - first) / (sides[cell + 1] - first), 0.0, 1.0)
+
+
+def _are_even(sides: Float[ndarray, " n"]) -> bool:
+    steps = np.diff(sides)
+    return bool(np.ptp(steps) < 1e-9 * steps[0])
 
 
 def _inside(table: ndarray, x: tuple[ndarray, ndarray], y: tuple[ndarray, ndarray]) -> ndarray:

@@ -8,7 +8,7 @@ have.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import isnan
+from math import hypot, isnan
 from typing import NamedTuple
 
 from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade
@@ -74,8 +74,8 @@ def _lens_is_missed(s: Situation) -> bool:
 
 def _of_photographs(s: Situation) -> Grade:
     apart = 2.0 * s.differ_px if s.groups else s.differ_px
-    if s.disagree == "shutter" and not s.groups:  # the camera is one; what the shutter did is in its error
-        return _as_far_as_it_goes(s)
+    if s.disagree == "shutter" and not s.groups:  # the camera is one, unless it zoomed and only seems sheared
+        return Grade.GOOD if hypot(s.error_px, s.differ_px) <= FINE_PX else Grade.USABLE
     return Grade.NO if apart > s.coarse_px else Grade.USABLE
 
 
