@@ -20,16 +20,18 @@ quadratics).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from orthoscope.evaluation.disagreement import Disagreement, changes_of, disagreement, spread_of
-from orthoscope.fitting.calibration import residuals_of
+from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
+from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.fccm import fit_flat
@@ -108,12 +110,11 @@ def two_groups(
     groupings = _groupings(_quadratics(fit, noise, ("k1",)))
     explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
     joint = float(np.nansum(whole.squares))
-    starts = (
-        [start for _, start in groupings[:REFINED_GROUPINGS]] if explained > LEAST_EXPLAINED_SHARE else []
-    )
-    squares, second = _best_refined(detections, starts, base=base)
-    if second is not None and np.sqrt(squares / joint) < APART_SHARE:
-        if not _agree_by_themselves(detections, second, base=base):
+    starts = [each for _, each in groupings[:REFINED_GROUPINGS]] if explained > LEAST_EXPLAINED_SHARE else []
+    together = fit_flat(detections, lens=base) if starts else None
+    squares, second = _best_refined(together, starts) if together else (np.inf, None)
+    if together and second is not None and np.sqrt(squares / joint) < APART_SHARE:
+        if not _agree_by_themselves(together, second):
             return None
         return _named(second, np.ones(len(second), dtype=bool))
     return None if found.kind == "shutter" else _two_values(_quadratics(fit, noise))
@@ -202,7 +203,7 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
 
 
 def _best_refined(
-    detections: Detections, starts: list[Bool[ndarray, " m"]], *, base: str
+    together: Calibration, starts: list[Bool[ndarray, " m"]]
 ) -> tuple[float, Bool[ndarray, " m"] | None]:
     """The refined grouping with the least squares; no more starts where two have come to it.
 
@@ -211,36 +212,33 @@ def _best_refined(
     """
     best: tuple[float, ndarray | None] = (np.inf, None)
     for start in starts:
-        refined = _refined(detections, start, base=base)
+        refined = _refined(together, start)
         if refined is None:
             continue
-        if best[1] is not None and _same_grouping(refined[1], best[1]):
-            break
+        if best[1] is not None and len(np.unique(refined[1] ^ best[1])) == 1:
+            break  # another start ends where the best one did
         if refined[0] < best[0]:
             best = refined
     return best
 
 
-def _agree_by_themselves(detections: Detections, second: Bool[ndarray, " m"], *, base: str) -> bool:
+def _agree_by_themselves(together: Calibration, second: Bool[ndarray, " m"]) -> bool:
     """Whether each group agrees on one camera: halves of a zoom in many steps, or of photographs by a rolling
     shutter, are better than the whole, but are no cameras.
     """
-    for group in (~second, second):
-        part = detections.only(np.flatnonzero(group))
-        if disagreement(linearised(_fit(part, base=base)), part).certain:
+    for group in (np.flatnonzero(~second), np.flatnonzero(second)):
+        known = linearised(_fit(together, group))
+        if disagreement(known, together.detections.only(group)).certain:
             return False
     return True
 
 
-def _same_grouping(one: Bool[ndarray, " m"], other: Bool[ndarray, " m"]) -> bool:
-    return bool((one == other).all() or (one != other).all())
-
-
-def _refined(
-    detections: Detections, second: Bool[ndarray, " m"], *, base: str
-) -> tuple[float, Bool[ndarray, " m"]] | None:
+def _refined(together: Calibration, second: Bool[ndarray, " m"]) -> tuple[float, Bool[ndarray, " m"]] | None:
     """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no
     camera.
+
+    Args:
+        together: one camera for all, with a flat target: what each group's fit starts from.
     """
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
@@ -252,9 +250,7 @@ def _refined(
             break
         seen.add(second.tobytes())
         try:
-            squares = np.stack(
-                [_squares(detections, np.flatnonzero(group), base=base) for group in (~second, second)]
-            )
+            squares = np.stack([_squares(together, np.flatnonzero(group)) for group in (~second, second)])
         except CalibrationError:
             break
         total = float(np.where(second, squares[1], squares[0]).sum())
@@ -264,9 +260,9 @@ def _refined(
     return best
 
 
-def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndarray, " m"]:
+def _squares(together: Calibration, group: ndarray) -> Float[ndarray, " m"]:
     """Squared error of each view by a group's camera: left out where it is of the group."""
-    fit = _fit(detections.only(group), base=base)
+    detections, fit = together.detections, _fit(together, group)
     shape, camera = fit.shape, fit.estimate.camera
     poses = resect(camera, detections, shape=shape)
     squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
@@ -274,8 +270,13 @@ def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndar
     return squares
 
 
-def _fit(detections: Detections, *, base: str) -> StepOneFit:
-    return fit_step_one(fit_flat(detections, lens=base), shape="free", first_lens=FREE)
+def _fit(together: Calibration, group: ndarray) -> StepOneFit:
+    start = replace(
+        together,
+        detections=together.detections.only(group),
+        camera_from_target=tuple(together.camera_from_target[i] for i in group),
+    )
+    return fit_step_one(start, shape="free", first_lens=FREE, tolerance=COMPARED_TOLERANCE)
 
 
 def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:
