@@ -74,6 +74,7 @@ def rows_of(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
+@pytest.mark.slow
 def test_every_figure_and_table_has_its_file(made):
     figures = {
         "fig2",
@@ -97,6 +98,7 @@ def test_every_figure_and_table_has_its_file(made):
     } | {f"{name}.csv" for name in figures}
 
 
+@pytest.mark.slow
 def test_files_have_their_columns_and_a_row_for_each_method_and_level(made):
     rows = rows_of(made.texts["fig2.csv"])
     assert list(rows[0]) == ["noise_px", *CURVES]
@@ -117,6 +119,7 @@ def test_files_have_their_columns_and_a_row_for_each_method_and_level(made):
     assert {row["study"] for row in rows_of(made.texts["trials_photographs.csv"])} == {"photographs"}
 
 
+@pytest.mark.slow
 def test_figures_are_the_means_of_the_trials(made):
     trials = [
         row
@@ -129,12 +132,14 @@ def test_figures_are_the_means_of_the_trials(made):
     ]  # one trial is its own mean
 
 
+@pytest.mark.slow
 def test_eq_7_ends_at_zero_and_at_different_cameras(made):
     ends = [row for row in rows_of(made.texts["eq7.csv"]) if row["scene"] == "low" and row["J"]]
     assert all(float(row["J"]) < 1e-10 for row in ends)
     assert len({row["fx"] for row in ends}) >= len(LEAST.dampings)
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_else_and_shows_every_figure(made):
     page = made.texts["paper.html"]
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)
@@ -195,7 +200,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-SOME = ("--only", "fig4", "--only", "eq7", "--points", "3x4")
+SOME = ("--only", "fig4", "--points", "3x4,4x5")
 
 
 @pytest.mark.parametrize("some", [SOME, pytest.param((), marks=pytest.mark.slow)], ids=["some", "all"])

@@ -223,8 +223,10 @@ def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: s
 def _write_straight(
     evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None
 ) -> Path:
-    from orthoscope.cli.undistort import straighten, write_beside
+    from orthoscope.cli.undistort import straighten, straighten_films, write_beside
+    from orthoscope.files.pictures import MOVING
     from orthoscope.geometry.arrays import InputError
+    from orthoscope.straight.film import is_video
     from orthoscope.straight.outputs import replace_outputs
     from orthoscope.straight.views import straight_camera
 
@@ -233,12 +235,27 @@ def _write_straight(
             "--undistort needs the photographs; these were corners found before. Use `orthoscope undistort`"
             " with the photographs."
         )
-    calibration = evaluation.calibration
-    paths = list(dict.fromkeys(files[view.image] for view in calibration.detections.views))
+    calibration, folder = evaluation.calibration, out / "undistorted"
+    paths = list(dict.fromkeys(_file_of(view.image, files) for view in calibration.detections.views))
+    films = [path for path in paths if is_video(path)]
+    photographs = [path for path in paths if path.suffix.lower() not in MOVING]
     view = straight_camera(calibration.camera, keep=keep)
-    written, _ = straighten(
-        paths, calibration.camera, out / "undistorted", view=view, jobs=jobs, cluster=cluster
-    )
-    beside = write_beside(calibration.camera, view, out / "undistorted", maps=None)
-    replace_outputs(out / "undistorted", [*written, *beside], paths)
-    return out / "undistorted"
+    written = list(straighten_films(films, calibration.camera, folder, view=view, jobs=jobs))
+    if photographs:
+        written += straighten(photographs, calibration.camera, folder, view=view, jobs=jobs, cluster=cluster)[
+            0
+        ]
+    beside = write_beside(calibration.camera, view, folder, maps=None)
+    replace_outputs(folder, [*written, *beside], paths)
+    if others := len(paths) - len(films) - len(photographs):
+        tell(f"left out   {others} files of frames that cannot be written straight; convert them", err=True)
+    return folder
+
+
+def _file_of(image: str, files: dict[str, Path]) -> Path:
+    """The file that a view was found in: a photograph, or a file of pages or frames."""
+    from orthoscope.files.pictures import file_name_of
+    from orthoscope.targets.detections import photograph_of
+
+    photograph = photograph_of(image)
+    return files[photograph] if photograph in files else files[file_name_of(photograph)]

@@ -45,11 +45,19 @@ def on_others(loaded: Calibration | Scene | Contents, detections: Detections, *,
 
     camera = loaded.camera
     error, board = evaluate_on(camera, detections), None
-    if own_board and isinstance(loaded, Calibration) and loaded.target_shape.kind != "flat":
+    if own_board and isinstance(loaded, Calibration) and _may_be_its_board(loaded, detections):
         board = same_board(camera, loaded.target_shape, error.detections)
         if board.same:
             error = evaluate_on(camera, detections, shape=loaded.target_shape)
     return OnOthers(error, board, check_camera(camera, error.detections))
+
+
+def _may_be_its_board(calibration: Calibration, detections: Detections) -> bool:
+    """Whether a shape was learnt, of a target that is described as this one is."""
+    return (
+        calibration.target_shape.kind != "flat"
+        and calibration.detections.target.name == detections.target.name
+    )
 
 
 def lines_of(found: OnOthers, *, verbose: bool = False) -> list[str]:

@@ -23,7 +23,7 @@ Examples:
   $ orthoscope paper -o paper/
   The paper's main claim, that MLDC is better than FCCM on test data, does not hold (in 0 of 4 figures); with its two
   steps repeated it holds (in 4 of 4 figures).
-  wrote      paper/paper.html and 14 CSV files
+  wrote      paper/paper.html and 13 CSV files
   $ orthoscope paper --photos photos/ --target chessboard:9x6:25mm -o paper/
   $ orthoscope paper --only fig4 --only fig5 --trials 5 --with mine=my_methods:calibrate -o paper/
 

@@ -109,7 +109,7 @@ class Plan:
     trials: int = 25
     seed: int = 0
     board: tuple[int, int] | None = None
-    noise_px: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
+    noise_px: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
     points: tuple[tuple[int, int], ...] = subgrids(PAPER_BOARD, GRID_COUNT)
     images: tuple[int, ...] = (1, 2, 3, 4, 5, 7, 10, 15)
     lenses: tuple[str, ...] = tuple(LENSES)
@@ -118,7 +118,7 @@ class Plan:
     eq7: Condition = Condition(PAPER_NOISE_PX)
     grids: int = GRID_COUNT
     most_trials: int = 8
-    most_table_trials: int = 5
+    most_table_trials: int = 3
     timed: tuple[int, ...] = (3, 5, 10, 15)
     only: tuple[str, ...] = ()
     own: tuple[PaperEntry, ...] = ()

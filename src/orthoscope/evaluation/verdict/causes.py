@@ -29,6 +29,8 @@ NOTICED_SHARE = 0.5
 NEGLIGIBLE_DIFFERENCE_PX = 0.05
 # A free lens may miss up to this share of the corners' noise.
 STIFF_SHARE = 0.5
+# What a formula misses, where it is a smaller share of the camera's error, limits nothing.
+PART_SHARE = 0.25
 # Chance makes hardly so large a share of the corners wild.
 WILD_SHARE = 0.005
 # With corners in less than this share of the frame's cells, it is corners that are missing.
@@ -68,8 +70,12 @@ def _matters(s: Situation) -> bool:
 
 
 def _lens_is_missed(s: Situation) -> bool:
-    """A free lens is as stiff as its data made it, and misses a little of every lens by intent."""
-    return s.lens_px > (STIFF_SHARE * s.noise_px if s.lens == "free" else 0.0)
+    """A free lens is as stiff as its data made it, and misses a little of every lens by intent; what a
+    formula misses is named where it shows beside the noise or is a good part of the camera's error.
+    """
+    if s.lens == "free":
+        return s.lens_px > STIFF_SHARE * s.noise_px
+    return s.lens_px > min(STIFF_SHARE * s.noise_px, PART_SHARE * s.error_px)
 
 
 def _of_photographs(s: Situation) -> Grade:

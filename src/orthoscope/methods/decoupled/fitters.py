@@ -32,7 +32,7 @@ COMPARED_TOLERANCE = 1e-4
 class Fitter(Protocol):
     """Fits models of step 1."""
 
-    def flat(self, base: str) -> Calibration:
+    def flat(self, base: str, /) -> Calibration:
         """With a flat target and this formula.
 
         Raises CalibrationError where the views cannot tell them.
