@@ -117,7 +117,7 @@ def write_for(
     loaded = load_source(source, image_size=image_size)
     check_not_onto([out], [source.rpartition("#")[0] if not Path(source).exists() else source])
     if crop or binning or resize:
-        camera = getattr(loaded, "camera", loaded)
+        camera: Any = getattr(loaded, "camera", loaded)
         loaded = options.camera_at_another_size(camera, crop=crop, binning=binning, resize=resize)
     exported = write(loaded, out, tool, name=name, anyway=anyway)
     for remark in exported.remarks():
