@@ -5,6 +5,8 @@ runs them.
 from __future__ import annotations
 
 import shutil
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ __all__ = ["undistorting"]
 
 COUNT, FRAMES, PICTURES = 200, 120, 4
 ROUNDS = 3
+MAP_ROUNDS = 9
 SIZE = (1920, 1080)
 DISCORPY_TIMES = 3
 ABOUT = (
@@ -53,6 +56,7 @@ def undistorting(peers: Peers, folder: Path) -> Part:
         part, folder, ("all cores, video", saved, told, _video(folder / "clip.mp4", files), FRAMES), [], None
     )
     _against_discorpy(part, peers, str(next(files.iterdir())), saved)
+    _map_alone(part, calibration.camera)
     return part
 
 
@@ -135,6 +139,50 @@ def _race(
 def _cleaned(out: Path, command: list[str | Path]) -> dict[str, Any]:
     shutil.rmtree(out, ignore_errors=True)
     return whole_process(command)
+
+
+def _map_alone(part: Part, camera: Camera) -> None:
+    """The map of one size of photograph, nothing read, looked up or written; one thread for each."""
+    straight, threads = camera.straight_intrinsics("all"), cv2.getNumThreads()
+
+    def timed(make: Callable[[], object]) -> dict[str, Any]:
+        wall, cpu = time.perf_counter(), time.process_time()
+        make()
+        return {"cpu": time.process_time() - cpu, "wall": time.perf_counter() - wall}
+
+    def theirs() -> object:
+        return cv2.initUndistortRectifyMap(
+            camera.intrinsics.matrix,
+            camera.lens.coefficients[:5],
+            np.eye(3),
+            straight.matrix,
+            SIZE,
+            cv2.CV_32FC1,
+        )
+
+    cv2.setNumThreads(1)
+    try:
+        results = race(
+            {
+                "ours": lambda: timed(lambda: camera.undistort_map(straight, SIZE)),
+                "theirs": lambda: timed(theirs),
+            },
+            rounds=MAP_ROUNDS,
+        )
+    finally:
+        cv2.setNumThreads(threads)
+    ours, theirs_ = results["ours"], results["theirs"]
+    part.rows.append(
+        Row(
+            "map alone, 1920x1080",
+            ours.cpu,
+            "initUndistortRectifyMap",
+            theirs_.cpu,
+            "ms",
+            1.2,
+            "process CPU, one thread",
+        )
+    )
 
 
 def _against_discorpy(part: Part, peers: Peers, path: str, saved: Path) -> None:

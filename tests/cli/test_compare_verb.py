@@ -46,7 +46,7 @@ def test_it_prints_a_table_the_best_first_and_what_follows(run, calibrated, tmp_
     assert all(str(tmp_path / name) in rows[-1] for name in FILES)
 
 
-def test_its_json_has_every_number_of_every_entrant_and_is_the_file(run, calibrated, tmp_path):
+def test_its_json_has_every_number_of_every_entry_and_is_the_file(run, calibrated, tmp_path):
     told = run("compare", calibrated / "detections.json", *THREE, "--folds", "3", "--json", "-o", tmp_path)
     numbers = json.loads(told.out)
     assert (tmp_path / "comparison.json").read_text() == told.out

@@ -125,6 +125,20 @@ def test_a_board_of_another_size_is_told_of(folder):
         detect(folder / "view1.png", "chessboard:10x7:25mm")
 
 
+def test_a_board_of_another_size_in_most_photographs_is_told_of_where_some_show_the_target(folder):
+    other, camera = chessboard(7, 5, 0.025), CAMERAS["brown"]
+    rng = np.random.default_rng(4)
+    (pose,) = random_views(camera, other, 1, rng=rng, tilt=(0.0, 0.5), margin=0.025)
+    pictures = {"other": Renderer(camera).photograph(other, pose, rng=rng)}
+    pictures |= {path.name: read_image(path, grey=True) for path in sorted(folder.iterdir())[:3]}
+    found = detect(pictures, other)
+    assert [view.image for view in found.views] == ["other"]
+    (remark,) = found.remarks
+    assert remark.image == "view1.png"
+    assert "a board of 9x6 inner corners in it and others" in remark.words
+    assert "--target chessboard:9x6:25mm" in remark.words
+
+
 def test_a_target_that_no_detector_knows_is_refused(folder):
     with pytest.raises(InputError, match="cannot be looked for in photographs"):
         detect(folder, Target("dots", BOARD.points))

@@ -59,7 +59,9 @@ def test_every_kind_has_a_detector():
 
 
 @every_board
-@pytest.mark.parametrize("renderer", [BROWNS, FISHEYES], ids=["brown", "fisheye"])
+@pytest.mark.parametrize(
+    "renderer", [BROWNS, pytest.param(FISHEYES, marks=pytest.mark.slow)], ids=["brown", "fisheye"]
+)
 def test_a_board_is_found_whole_with_its_ids_at_any_roll_and_tilt(board, renderer):
     target, rng = target_of(board), np.random.default_rng(3)
     views = random_views(

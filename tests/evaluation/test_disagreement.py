@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from helpers.boards import NARROW, perfect
 from helpers.studied import Recipe, found_in, made, photographs_by, richest_fit
 from orthoscope.evaluation.disagreement import changes_of, disagreement, spread_of, wishes
 from orthoscope.evaluation.groups import two_groups
 from orthoscope.fitting.leave_one_out import leave_one_out
+from orthoscope.models.lenses import Brown
+from orthoscope.simulation.scene import simulate_detections
 
 USUAL = Recipe()
 MANY = replace(USUAL, standing=replace(USUAL.standing, count=20))
@@ -65,6 +68,22 @@ def test_photographs_of_two_cameras_are_told_apart(kind: str, amount: float):
     assert len(first) == len(second) == 1
     assert first != second
     assert len(groups.unsure) <= 6  # frontal photographs do not tell a zoom of 2 %
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_photographs_and_their_straightened_copies_are_told_apart_one_by_one(seed: int):
+    """A grouping with some pairs swapped is better than one camera, too; the search goes on from it."""
+    scene, taken = perfect(NARROW, 8, seed, noise_px=0.05)
+    copies = replace(scene, camera=replace(NARROW, lens=Brown()))
+    straight = simulate_detections(copies, noise_px=0.05, rng=np.random.default_rng(seed))
+    copied = tuple(replace(view, image=f"straight {view.image}") for view in straight.views)
+    both = [view for pair in zip(taken.views, copied, strict=True) for view in pair]
+    detections = replace(taken, views=tuple(both))
+    fit = richest_fit(detections)
+    groups = two_groups(fit, disagreement(fit, detections), leave_one_out(fit), detections, base="brown")
+    assert groups is not None
+    assert {groups.first, groups.second} == {tuple(range(0, 16, 2)), tuple(range(1, 16, 2))}
 
 
 def test_a_lens_that_focuses_anew_for_every_photograph_makes_no_two_groups():

@@ -2,7 +2,7 @@
 
 To check a call takes several times what most calls take, and a function that hands on a wrong shape does so
 from its first call on. So calls 1, 10, 100... of each function in each test are checked; of one within a
-function, which is made anew each time and so is its check, the first.
+function, which is made anew each time and so is its check, the first of all.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ __all__ = ["begin_test", "checked", "sampled"]
 CHECKED_CALLS = frozenset(10**power for power in range(8))
 # How often each function was called in this test.
 _CALLS: dict[CodeType, int] = {}
+# Functions within functions that were checked once.
+_INNER_CHECKED: set[CodeType] = set()
 
 
 def begin_test() -> None:
@@ -61,7 +63,7 @@ def sampled(thing: Any = None, *, typechecker: Callable[..., Any] = checked) -> 
 
 def _sampled(function: Any, typechecker: Callable[..., Any]) -> Callable[..., Any]:
     code = function.__code__
-    calls_checked = CHECKED_CALLS if "<locals>" not in function.__qualname__ else frozenset({1})
+    is_inner = "<locals>" in function.__qualname__
     check: Callable[..., Any] | None = None
 
     @wraps(function)
@@ -69,8 +71,10 @@ def _sampled(function: Any, typechecker: Callable[..., Any]) -> Callable[..., An
         __tracebackhide__ = True
         nonlocal check
         calls = _CALLS[code] = _CALLS.get(code, 0) + 1
-        if calls not in calls_checked:
+        if calls not in CHECKED_CALLS or code in _INNER_CHECKED:
             return function(*args, **kwargs)
+        if is_inner:
+            _INNER_CHECKED.add(code)
         if check is None:
             check = jaxtyped(function, typechecker=typechecker)
         return check(*args, **kwargs)

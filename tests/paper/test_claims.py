@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from helpers.made_up import IMAGES, NOISE, POINTS, curve, curves, ended
-from orthoscope.paper import claims_about_curves, claims_about_eq7
-from orthoscope.paper.claims import MAIN, Claim, ClaimVerdict, main_headline, of_sentence
-from orthoscope.paper.entries import FCCM5, MLDC, REPEATED
+from helpers.made_up import IMAGES, NOISE, POINTS, curve, curves, ended, outcome
+from orthoscope.paper import claims_about_curves, claims_about_eq7, claims_about_steps, sentences
+from orthoscope.paper.claims import Claim, ClaimVerdict, main_headline, of_sentence
+from orthoscope.paper.entries import FCCM5, MLDC, NMLDC, REPEATED
+from orthoscope.paper.step_two import DEGREES, name_of_degree, name_of_images
+from orthoscope.paper.times import Timing
+from orthoscope.paper.trials import Outcome
 
 
 @pytest.mark.parametrize(
@@ -187,12 +190,13 @@ def test_the_fair_chance_names_whoever_is_least():
 
 def test_the_headline_counts_only_the_main_claim():
     fails, holds, partly = (
-        Claim("x", MAIN, verdict, "")
+        Claim("x", sentences.BETTER, verdict, "")
         for verdict in (ClaimVerdict.FAILS, ClaimVerdict.HOLDS, ClaimVerdict.PARTLY)
     )
-    other = Claim("x", "something else", ClaimVerdict.HOLDS, "")
+    other = Claim("x", sentences.WEIGHTS, ClaimVerdict.HOLDS, "")
     repeated = [
-        Claim("x", MAIN, verdict, "", ours=True) for verdict in (ClaimVerdict.HOLDS, ClaimVerdict.HOLDS)
+        Claim("x", sentences.BETTER, verdict, "", ours=True)
+        for verdict in (ClaimVerdict.HOLDS, ClaimVerdict.HOLDS)
     ]
     assert "does not hold (in 0 of 2 figures)." in main_headline([fails, fails, other])
     assert "holds in part (in 1 of 2 figures)" in main_headline([fails, holds, other])
@@ -207,7 +211,7 @@ def test_the_headline_counts_only_the_main_claim():
 
 def test_a_sentence_counts_once_and_only_as_the_paper_prints_it():
     fails, holds, opened, ours = (
-        Claim("x", MAIN, verdict, "", ours)
+        Claim("x", sentences.BETTER, verdict, "", ours)
         for verdict, ours in (
             (ClaimVerdict.FAILS, False),
             (ClaimVerdict.HOLDS, False),
@@ -236,3 +240,48 @@ def test_weights_matter_where_they_move_the_camera():
     still = moved._replace(judgement=plain.judgement)
     assert claims_about_eq7.weights_do_not_matter("x", [plain, still]).verdict is ClaimVerdict.HOLDS
     assert claims_about_eq7.weights_do_not_matter("x", [plain]).verdict is ClaimVerdict.OPEN
+
+
+def steps(entry: str, test_nce: float, rounds: float, bent_px: float = 0.1) -> Outcome:
+    judgement = outcome(entry, 0.1, 0, test_nce).judgement._replace(steps=rounds, bent_px=bent_px)
+    return outcome(entry, 0.1, 0, test_nce)._replace(judgement=judgement)
+
+
+def test_the_degree_does_not_matter_where_rounds_and_errors_are_those_of_the_fifth():
+    alike = [steps(name_of_degree(degree), 0.02, 5) for degree in DEGREES]
+    assert claims_about_steps.degree_does_not_matter("x", alike).verdict is ClaimVerdict.HOLDS
+    slow = [steps(name_of_degree(2), 0.02, 9), *alike[1:]]
+    claim = claims_about_steps.degree_does_not_matter("x", slow)
+    assert claim.verdict is ClaimVerdict.PARTLY
+    assert "for 2 of 3 others" in claim.finding
+    assert claims_about_steps.degree_does_not_matter("x", []).verdict is ClaimVerdict.OPEN
+
+
+def test_one_image_is_enough_where_its_lens_is_better_than_rounding():
+    all_images = steps(name_of_degree(5), 0.02, 5)
+    for nce, verdict in ((0.3, ClaimVerdict.HOLDS), (3.0, ClaimVerdict.FAILS)):
+        of = [all_images, steps(name_of_images(1), nce, 5)]
+        assert claims_about_steps.one_image_is_enough("x", of).verdict is verdict
+
+
+def test_time_grows_where_each_number_of_images_takes_longer_than_the_last():
+    told = [Timing(count, MLDC, 10 * count, seconds, 9) for count, seconds in ((3, 0.2), (15, 2.5))]
+    claim = claims_about_steps.time_grows("x", told)
+    assert claim.verdict is ClaimVerdict.HOLDS
+    assert "0.2 s with 3 images (30 unknowns) and 2.5 s with 15" in claim.finding
+    assert claims_about_steps.time_grows("x", told[::-1]).verdict is ClaimVerdict.HOLDS  # in any order
+    assert claims_about_steps.time_grows("x", told[:1]).verdict is ClaimVerdict.OPEN
+
+
+def test_fig_7_is_judged_by_how_far_rows_and_columns_are_off_straight():
+    of = [
+        steps(MLDC, 1.0, 5, 0.3),
+        steps(NMLDC, 1.0, 5, 0.2),
+        steps("FCCM", 1.0, 5, 0.4),
+        steps(REPEATED, 1.0, 5),
+    ]
+    claim = claims_about_steps.better_straightened("Fig. 7", of)
+    assert claim.verdict is ClaimVerdict.PARTLY
+    assert "0.300 for MLDC, eq. (7), 0.200 for NMLDC, plain" in claim.finding
+    ours = claims_about_steps.better_straightened("Fig. 7", of, mldc=REPEATED)
+    assert (ours.verdict, ours.ours) == (ClaimVerdict.HOLDS, True)

@@ -117,18 +117,20 @@ def calibrate_into(
     as_json: bool = False,
 ) -> Any:
     """The main job; prints the summary and returns the evaluation."""
-    from orthoscope.cli.executors import processes, threads
-    from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.judged import EVALUATION_NAME
-    from orthoscope.cli.method_settings import settings_from
     from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import evaluation_lines
-    from orthoscope.evaluation.evaluate import evaluate
-    from orthoscope.files.whole_files import check_folder
-    from orthoscope.formats.own.json import save, text_of
-    from orthoscope.methods import calibrate as run
-    from orthoscope.methods import settings_of
-    from orthoscope.targets.left_out import left_out
+
+    with bar("starting"):  # loading takes most of the first half second
+        from orthoscope.cli.executors import processes, threads
+        from orthoscope.cli.inputs import detections_from
+        from orthoscope.cli.judged import EVALUATION_NAME
+        from orthoscope.cli.method_settings import settings_from
+        from orthoscope.cli.summary import evaluation_lines
+        from orthoscope.evaluation.evaluate import evaluate
+        from orthoscope.files.whole_files import check_folder
+        from orthoscope.formats.own.json import save, text_of
+        from orthoscope.methods import calibrate as run
+        from orthoscope.methods import settings_of
+        from orthoscope.targets.left_out import left_out
 
     check_folder(out)
     lenses = _lenses_of(export)
@@ -155,7 +157,7 @@ def calibrate_into(
     with bar("calibrating") as progress:
         told = {"judging": progress} if "judging" in settings_of(method) else {}
         calibration = run(detections, method=method, **given, **told)
-    with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
+    with processes(jobs if folds else jobs or 1, cluster) as executor, bar("evaluating") as progress:
         evaluation = evaluate(calibration, folds=folds, executor=executor, progress=progress)
     for thing, name in ((calibration, "calibration.json"), (evaluation, EVALUATION_NAME)):
         save(thing, out / name)
@@ -221,8 +223,10 @@ def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: s
 def _write_straight(
     evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None
 ) -> Path:
-    from orthoscope.cli.undistort import straighten, write_beside
+    from orthoscope.cli.undistort import straighten, straighten_films, write_beside
+    from orthoscope.files.pictures import MOVING
     from orthoscope.geometry.arrays import InputError
+    from orthoscope.straight.film import is_video
     from orthoscope.straight.outputs import replace_outputs
     from orthoscope.straight.views import straight_camera
 
@@ -231,12 +235,27 @@ def _write_straight(
             "--undistort needs the photographs; these were corners found before. Use `orthoscope undistort`"
             " with the photographs."
         )
-    calibration = evaluation.calibration
-    paths = list(dict.fromkeys(files[view.image] for view in calibration.detections.views))
+    calibration, folder = evaluation.calibration, out / "undistorted"
+    paths = list(dict.fromkeys(_file_of(view.image, files) for view in calibration.detections.views))
+    films = [path for path in paths if is_video(path)]
+    photographs = [path for path in paths if path.suffix.lower() not in MOVING]
     view = straight_camera(calibration.camera, keep=keep)
-    written, _ = straighten(
-        paths, calibration.camera, out / "undistorted", view=view, jobs=jobs, cluster=cluster
-    )
-    beside = write_beside(calibration.camera, view, out / "undistorted", maps=None)
-    replace_outputs(out / "undistorted", [*written, *beside], paths)
-    return out / "undistorted"
+    written = list(straighten_films(films, calibration.camera, folder, view=view, jobs=jobs))
+    if photographs:
+        written += straighten(photographs, calibration.camera, folder, view=view, jobs=jobs, cluster=cluster)[
+            0
+        ]
+    beside = write_beside(calibration.camera, view, folder, maps=None)
+    replace_outputs(folder, [*written, *beside], paths)
+    if others := len(paths) - len(films) - len(photographs):
+        tell(f"left out   {others} files of frames that cannot be written straight; convert them", err=True)
+    return folder
+
+
+def _file_of(image: str, files: dict[str, Path]) -> Path:
+    """The file that a view was found in: a photograph, or a file of pages or frames."""
+    from orthoscope.files.pictures import file_name_of
+    from orthoscope.targets.detections import photograph_of
+
+    photograph = photograph_of(image)
+    return files[photograph] if photograph in files else files[file_name_of(photograph)]

@@ -18,8 +18,9 @@ __all__ = ["compare"]
 
 EXAMPLE = """\b
 Example:
-  $ orthoscope compare photos/ --target chessboard:9x6:25mm --with decoupled --with decoupled:brown --with
-  fccm:brown views      14 used, 0 set aside; 756 corners; 5 folds held out
+  $ orthoscope compare photos/ --target chessboard:9x6:25mm --with decoupled --with decoupled:brown \\
+    --with fccm:brown
+  views      14 used, 0 set aside; 756 corners; 5 folds held out
                    held out (px)     loses (px)    NCE  used (px)  parameters  seconds  lens   target
   decoupled        0.088 ± 0.015           best  0.180      0.067         162     3.30  free   free
   decoupled:brown  0.090 ± 0.013  0.002 ± 0.002  0.189      0.074         141     3.04  brown  free
@@ -97,7 +98,7 @@ def compare(
         detections, _ = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress
         )
-    with processes(jobs or 1, cluster) as executor, bar("comparing") as progress:
+    with processes(jobs, cluster) as executor, bar("comparing") as progress:
         comparison = judge(detections, entries, folds=folds, executor=executor, progress=progress)
     texts = {
         "comparison.json": text_of(comparison),

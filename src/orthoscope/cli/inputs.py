@@ -38,14 +38,16 @@ def detections_from(
 
     Args:
         paths: photographs (files, folders, globs), or one .json of ours, or one .vnl.
-        target: needed but for our own file.
+        target: needed but for our own file, which knows its own.
         image_size: needed with a .vnl, which does not know it.
         jobs, executor, progress: as in `detect`.
     Raises:
         InputError: something needed is missing.
     """
     if len(paths) == 1 and Path(paths[0]).suffix == ".json":
-        return load_detections(paths[0]), {}
+        found = load_detections(paths[0])
+        _check_same_target(found, target, paths[0])
+        return found, {}
     if target is None:
         raise InputError(
             "no target was named; say what was photographed, such as --target chessboard:9x6:25mm (inner"
@@ -80,3 +82,19 @@ def detections_from(
         for view in found.views
         if (photograph := photograph_of(view.image)) in named
     }
+
+
+def _check_same_target(found: Detections, target: str | Target | None, path: str | Path) -> None:
+    """Corners that were found before are of the target that they were found for.
+
+    Raises:
+        InputError: another target is named.
+    """
+    if target in (None, AUTO):
+        return
+    named = parse_target(target) if isinstance(target, str) else target
+    if named.name != found.target.name:
+        raise InputError(
+            f"{path} holds corners of {found.target.name}; --target says {named.name}. Leave --target out, or"
+            " find the corners of that target in the photographs: orthoscope detect."
+        )

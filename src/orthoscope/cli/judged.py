@@ -56,5 +56,5 @@ def _made(
     from orthoscope.cli.progress import bar
     from orthoscope.evaluation.evaluate import evaluate
 
-    with processes(jobs or 1, cluster) as executor, bar("evaluating") as progress:
+    with processes(jobs if folds else jobs or 1, cluster) as executor, bar("evaluating") as progress:
         return evaluate(calibration, folds=folds, executor=executor, progress=progress)

@@ -45,11 +45,19 @@ def on_others(loaded: Calibration | Scene | Contents, detections: Detections, *,
 
     camera = loaded.camera
     error, board = evaluate_on(camera, detections), None
-    if own_board and isinstance(loaded, Calibration) and loaded.target_shape.kind != "flat":
+    if own_board and isinstance(loaded, Calibration) and _may_be_its_board(loaded, detections):
         board = same_board(camera, loaded.target_shape, error.detections)
         if board.same:
             error = evaluate_on(camera, detections, shape=loaded.target_shape)
     return OnOthers(error, board, check_camera(camera, error.detections))
+
+
+def _may_be_its_board(calibration: Calibration, detections: Detections) -> bool:
+    """Whether a shape was learnt, of a target that is described as this one is."""
+    return (
+        calibration.target_shape.kind != "flat"
+        and calibration.detections.target.name == detections.target.name
+    )
 
 
 def lines_of(found: OnOthers, *, verbose: bool = False) -> list[str]:
@@ -58,11 +66,13 @@ def lines_of(found: OnOthers, *, verbose: bool = False) -> list[str]:
     Args:
         verbose: the photographs that were set aside, and NCE, as well.
     """
+    from orthoscope.geometry.numbers import pixels
+
     error = found.error
     aside = error.detections.set_aside
     lines = [
         f"verdict    {_verdict(found)}",
-        f"off by     {error.rms_px:.3f} px per corner, the camera fixed, poses fitted",
+        f"off by     {pixels(error.rms_px)} px per corner, the camera fixed, poses fitted",
         f"photos     {len(error.detections.views)} used, {len(aside)} set aside; {error.detections.corners} corners",
     ]
     if found.board:
@@ -113,11 +123,13 @@ def _verdict(found: OnOthers) -> str:
 
 def _board_line(board: SameBoard) -> str:
     """Whether it is the board that the camera was calibrated with, and how that shows."""
+    from orthoscope.geometry.numbers import pixels
+
     which = "the one of the calibration" if board.same else "another than that of the calibration"
     taken = (
         "the shape found there is used"
         if board.same
         else "its corners are taken to be where they are said to be"
     )
-    figures = f"{board.learnt_px:.3f} px with the shape found there, {board.said_px:.3f} without"
+    figures = f"{pixels(board.learnt_px)} px with the shape found there, {pixels(board.said_px)} without"
     return f"{'' if board.sure else 'perhaps '}{which}: {figures}; {taken}"

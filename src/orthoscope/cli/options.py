@@ -246,8 +246,8 @@ jobs: Decorator = click.option(
     "--jobs",
     type=click.IntRange(1),
     help=(
-        "How much is done at the same time: photographs, by default as many as there are cores; folds, by"
-        " default one."
+        "How much is done at the same time: photographs, and folds where they are asked for; by default as many"
+        " as there are cores."
     ),
 )
 cluster: Decorator = click.option(

@@ -21,9 +21,10 @@ EXAMPLE = """\b
 Examples:
   $ orthoscope simulate --views 15 --noise 0.1 -o simulated/
   wrote      simulated/detections.json, and simulated/truth.json: camera, target and poses
-  $ orthoscope simulate --lens kannala_brandt:k1=-0.02 --image-size 1280x960 --focal 400 --render -o
-  simulated/ $ orthoscope simulate --camera camera/calibration.json --target chessboard:14x20:14mm
-  --tilt-noise -o simulated/
+  $ orthoscope simulate --lens kannala_brandt:k1=-0.02 --image-size 1280x960 --focal 400 --render \\
+    -o simulated/
+  $ orthoscope simulate --camera camera/calibration.json --target chessboard:14x20:14mm --tilt-noise \\
+    -o simulated/
 """
 
 

@@ -59,7 +59,7 @@ def _photographs_line(evaluation: Evaluation) -> str:
 
 def _details(evaluation: Evaluation) -> list[str]:
     """Figures for experts, and everything one by one."""
-    from orthoscope.geometry.numbers import with_error
+    from orthoscope.geometry.numbers import pixels, with_error
 
     calibration = evaluation.calibration
     detections, camera, aside = calibration.detections, calibration.camera, calibration.detections.set_aside
@@ -74,8 +74,8 @@ def _details(evaluation: Evaluation) -> list[str]:
     lines += [f"suspect    {image}: {reason}" for image, reason in evaluation.suspects]
     lines += _error_lines(evaluation)
     lines.append(
-        f"rms        {evaluation.rms_px:.3f} px per point (median {evaluation.median_px:.3f}, largest"
-        f" {evaluation.largest_px:.2f})"
+        f"rms        {pixels(evaluation.rms_px)} px per point (median {pixels(evaluation.median_px)}, largest"
+        f" {pixels(evaluation.largest_px)})"
     )
     if not math.isnan(evaluation.held_out_rms_px):
         lines.append(
@@ -110,20 +110,25 @@ def _details(evaluation: Evaluation) -> list[str]:
 
 def _error_lines(evaluation: Evaluation) -> list[str]:
     """How far off the camera is, and what makes it up."""
+    from orthoscope.geometry.numbers import pixels
+
     error = evaluation.error
     if error is None:
         return []
     return [
-        f"off by     {error.seen_px:.3f} px where corners were seen, {error.frame_px:.3f} over the frame;"
-        f" at the target's distances {error.near_seen_px:.3f}, {error.near_frame_px:.3f}",
-        f"           of it {error.model_px:.3f} by independent errors of corners, {error.alike_px:.3f} with"
-        f" errors alike in a view, {error.views_px:.3f} by leaving views out, {error.bias_px:.3f} against the"
+        f"off by     {pixels(error.seen_px)} px where corners were seen, {pixels(error.frame_px)} over the"
+        f" frame; at the target's distances {pixels(error.near_seen_px)}, {pixels(error.near_frame_px)}",
+        f"           of it {pixels(error.model_px)} by independent errors of corners,"
+        f" {pixels(error.alike_px)} with errors alike in a view, {pixels(error.views_px)} by leaving views"
+        f" out, {pixels(error.bias_px)} against the"
         " richest model",
     ]
 
 
 def _choice_lines(calibration: Calibration) -> list[str]:
     """The target's shape, and what the next best of the candidates would lose."""
+    from orthoscope.geometry.numbers import pixels
+
     shape, lines = calibration.target_shape, []
     if shape.kind != "flat":
         lines.append(
@@ -134,9 +139,7 @@ def _choice_lines(calibration: Calibration) -> list[str]:
     others = [one for one in calibration.candidates if one.loses_px != 0.0]
     if others:
         other = min(others, key=lambda one: math.inf if math.isnan(one.held_out_px) else one.held_out_px)
-        how = (
-            f"loses {other.loses_px:.3f} px" if other.loses_px > 0 else f"would gain {-other.loses_px:.3f} px"
-        )
+        how = f"{'loses' if other.loses_px > 0 else 'would gain'} {pixels(abs(other.loses_px))} px"
         lines.append(
             f"choice     target {settings['shape']}, lens {settings['lens']}, base {settings['base']}; next target"
             f" {other.target}, lens {other.lens}, base {other.base} {how} held out"
@@ -186,7 +189,9 @@ def _misfit_line(target: MisfitTest, lens: MisfitTest) -> str:
 
 
 def _systematic(test: MisfitTest) -> str:
-    return "not tested" if math.isnan(test.f) else f"{test.systematic_px:.3f} px (F {test.f:.1f})"
+    from orthoscope.geometry.numbers import pixels
+
+    return "not tested" if math.isnan(test.f) else f"{pixels(test.systematic_px)} px (F {test.f:.1f})"
 
 
 def _plain(thing: Any) -> Any:

@@ -108,13 +108,20 @@ def undistort(
         removed = [str(path) for path in gone]
         tell_json(to_json({"written": made, "rejected": rejected, "removed": removed, "camera": numbers}))
         return
+    wrote_camera = isinstance(view, Camera)
     if gone:
         tell(f"removed    {len(gone)} files of an earlier run that this one does not write", err=True)
     if (share := share_kept(loaded, view)) < 1.0 and keep == "all":
         tell(f"shows      {100 * share:.3g} % of what was photographed ({projection})", err=True)
     made = [f"{film}, {count} frames" for film, count in frames.items()]
-    made += [f"{len(written)} pictures into {out}/"] if written else []
-    tell(f"wrote      {'; '.join(made)}" + (f", and {beside[0]}, their camera" if beside else ""))
+    made += [f"{len(written)} picture{'s' if len(written) > 1 else ''} into {out}/"] if written else []
+    others = (
+        [f"{beside[0]}, {'its' if len(frames) + len(written) == 1 else 'their'} camera"]
+        if wrote_camera
+        else []
+    )
+    others += [str(path) for path in beside[wrote_camera:]]
+    tell(f"wrote      {'; '.join(made)}" + "".join(f", and {other}" for other in others))
 
 
 def write_beside(camera: Any, view: Any, out: Path, *, maps: str | None) -> list[Path]:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.chessboard import board_size
+from orthoscope.detection.chessboard import board_size, lattice_sizes
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.table import check_can_be_seen
 from orthoscope.detection.together import see_members
@@ -35,7 +35,9 @@ __all__ = ["detect"]
 # Where none showed the target the reasons of so many photographs are told.
 LISTED_PHOTOGRAPHS = 5
 # Where none showed the target so many photographs are looked at for a board of another size.
-TRIED_PHOTOGRAPHS = 3
+TRIED_PHOTOGRAPHS = 5
+# Lattices of one size in so many of them are a board's.
+ALIKE_PHOTOGRAPHS = 3
 
 
 class _Look(NamedTuple):
@@ -94,6 +96,7 @@ def detect(
     ]
     if not views or size is None:
         raise CalibrationError(_nothing_found(given, looks, target, aside))
+    remarks += _if_another(given, looks, target, views)
     return Detections(target, size, tuple(views), tuple(aside), remarks=tuple(remarks))
 
 
@@ -172,19 +175,36 @@ def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, asi
         return f"none of {len(given)} photographs can be read; expected images. Look at them:{reasons}"
     told = f"{target.name} was found in none of {len(readable)} photographs; expected it in most of them."
     if isinstance(target.board, Chessboard) and (board := _board_instead(readable, target.board)):
-        columns, rows = board
-        return (
-            f"{told} There seems to be a board of {columns}x{rows} inner corners in"
-            f" {readable[0].name if len(readable) == 1 else 'them'}: if that is the one, say --target"
-            f" {replace(target.board, columns=columns, rows=rows).description}."
-        )
+        where = readable[0].name if len(readable) == 1 else "them"
+        return f"{told} There seems to be {_instead(board, target.board, where)}."
     advice = target.board.advice if target.board else "See that it is whole, sharp and lit"
     return f"{told} {advice}:{reasons}"
 
 
 def _board_instead(given: list[Picture], target: Chessboard) -> tuple[int, int] | None:
-    """The size of the board that most of a few photographs show, where it is not the target's."""
+    """The size of the board that a few photographs show, where it is not the target's: by its four sides, or,
+    where these are not seen, by the lattice of one size that comes again and again.
+    """
     few = given[:: max(1, len(given) // TRIED_PHOTOGRAPHS)][:TRIED_PHOTOGRAPHS]
-    seen = Counter(board for picture in few if (board := board_size(picture.grey(most_megapixels=np.inf))))
+    greys = [picture.grey(most_megapixels=np.inf) for picture in few]
+    whole = Counter(board for grey in greys if (board := board_size(grey)))
+    again = Counter(size for grey in greys for size in lattice_sizes(grey)) if not whole else Counter()
+    seen = whole or {size: count for size, count in again.items() if count >= ALIKE_PHOTOGRAPHS}
     others = {board: count for board, count in seen.items() if sorted(board) != sorted(target.grid)}
     return max(others, key=lambda board: others[board], default=None)
+
+
+def _if_another(given: list[Picture], looks: list[_Look], target: Target, views: list[View]) -> list[Remark]:
+    """A remark where most photographs do not show the target and seem to show a board of another size."""
+    unseen = [picture for picture, look in zip(given, looks, strict=True) if look.size and not look.found]
+    if len(unseen) <= len(views) or not isinstance(target.board, Chessboard):
+        return []
+    if (board := _board_instead(unseen, target.board)) is None:
+        return []
+    return [Remark(unseen[0].name, f"there seems to be {_instead(board, target.board, 'it and others')}")]
+
+
+def _instead(board: tuple[int, int], target: Chessboard, where: str) -> str:
+    columns, rows = board
+    spec = replace(target, columns=columns, rows=rows).description
+    return f"a board of {columns}x{rows} inner corners in {where}: if that is the one, say --target {spec}"

@@ -18,12 +18,16 @@ __all__ = ["off_smooth_grid"]
 
 # Corners are off by more than so many times the usual residual.
 TIMES_USUAL = 8.0
-# And by at least so many pixels, or this share of a step.
-LEAST_PX, LEAST_STEP_SHARE = 0.6, 0.01
-# In a poor picture, whose noise makes the residuals, they are off beyond so many times the usual one.
+# A corner that is off is off by at least so many pixels.
+LEAST_PX = 0.6
+# A corner that is off is off by at least this share of a step, where that is more pixels.
+LEAST_STEP_SHARE = 0.01
+# In a poor picture, whose noise makes the residuals, corners are off beyond so many times the usual one.
 TIMES_NOISE = 3.2
-# There they are off, whatever is usual, beyond so many pixels or this share of a step.
-MOST_PX, MOST_STEP_SHARE = 0.6, 0.03
+# In a poor picture corners are off beyond so many pixels, whatever is usual.
+MOST_PX = 0.6
+# In a poor picture corners are off beyond this share of a step, where that is more pixels, whatever is usual.
+MOST_STEP_SHARE = 0.03
 # In a good picture corners that are not doubtful are off beyond this share of a step only: how a lens or a
 # board bends the last of them the others cannot foresee.
 SURE_STEP_SHARE = 0.15

@@ -30,6 +30,7 @@ from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.held_out import USUAL_FOLDS
+from orthoscope.fitting.leave_one_out import leave_one_out
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
@@ -221,7 +222,8 @@ def _agreement(reference: ReferenceFit | None, detections: Detections) -> tuple[
     found = disagreement(reference.known, detections)
     if not found.certain:
         return found, None
-    return found, two_groups(reference.known, found, reference.left_out, detections, base=reference.base)
+    whole = leave_one_out(reference.known)
+    return found, two_groups(reference.known, found, whole, detections, base=reference.base)
 
 
 def _trained_nce(calibration: Calibration) -> float:

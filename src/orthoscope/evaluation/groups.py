@@ -11,7 +11,7 @@ quadratic is lower. Two questions, and either makes two groups of photographs:
 2. *Do two cameras foresee the photographs far better?*  Groupings of the linear step are refined by a fit for
    each group, each view going to the camera that sees it with less error (by leave-one-out in its own group),
    until nothing changes. Photographs are of two cameras where these foresee them with less than APART_SHARE
-   of the error of one for all.
+   of the error of one for all, and each agrees on its camera by itself.
 
 The first finds what is small beside the noise, the second what is too large to be linear.
 S. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28(2), 1982 (k-means, here on
@@ -20,16 +20,18 @@ quadratics).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.evaluation.disagreement import Disagreement, changes_of, spread_of
-from orthoscope.fitting.calibration import residuals_of
+from orthoscope.evaluation.disagreement import Disagreement, changes_of, disagreement, spread_of
+from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
+from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.fccm import fit_flat
@@ -38,10 +40,9 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Groups", "two_groups"]
 
-# Two cameras leave less than this share of the error of one camera for all.
-APART_SHARE = 0.7
-# Where less than this share of one camera's error is left no other start is tried.
-BEYOND_DOUBT_SHARE = 0.5
+# Two cameras leave less than this share of the error of one camera for all: the halves of what is merely
+# spread leave .5 of it where the spread is even, .6 where it is normal.
+APART_SHARE = 0.45
 # The logarithm of the likelihood ratio, of two values against a spread, is at least this.
 LEAST_LOG_RATIO = 2.5
 # A view with less than this for either group is in none.
@@ -57,7 +58,7 @@ REFINING_ROUNDS = 6
 # K-means, and the likelihoods, have so many rounds.
 SETTLING_ROUNDS = 60
 # So many groupings are refined.
-REFINED_GROUPINGS = 4
+REFINED_GROUPINGS = 6
 
 
 class Groups(NamedTuple):
@@ -99,7 +100,7 @@ def two_groups(
     Args:
         fit: of all views, every corner free and a free lens.
         found: how they disagree.
-        whole: each view left out of the fit.
+        whole: each view left out of the fit; one by one, since copies may be of two cameras.
         detections: of the fit.
         base: the formula under the free lens.
     """
@@ -108,15 +109,13 @@ def two_groups(
     noise = fit.noise * max(1.0, found.wishes.tau)
     groupings = _groupings(_quadratics(fit, noise, ("k1",)))
     explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
-    joint, best = float(np.nansum(whole.squares)), (np.inf, None)
-    for _, start in groupings[:REFINED_GROUPINGS] if explained > LEAST_EXPLAINED_SHARE else ():
-        refined = _refined(detections, start, base=base)
-        if refined is not None and refined[0] < best[0]:
-            best = refined
-        if np.sqrt(best[0] / joint) < BEYOND_DOUBT_SHARE:
-            break
-    squares, second = best
-    if second is not None and np.sqrt(squares / joint) < APART_SHARE:
+    joint = float(np.nansum(whole.squares))
+    starts = [each for _, each in groupings[:REFINED_GROUPINGS]] if explained > LEAST_EXPLAINED_SHARE else []
+    together = fit_flat(detections, lens=base) if starts else None
+    squares, second = _best_refined(together, starts) if together else (np.inf, None)
+    if together and second is not None and np.sqrt(squares / joint) < APART_SHARE:
+        if not _agree_by_themselves(together, second):
+            return None
         return _named(second, np.ones(len(second), dtype=bool))
     return None if found.kind == "shutter" else _two_values(_quadratics(fit, noise))
 
@@ -203,11 +202,43 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
     )
 
 
-def _refined(
-    detections: Detections, second: Bool[ndarray, " m"], *, base: str
-) -> tuple[float, Bool[ndarray, " m"]] | None:
+def _best_refined(
+    together: Calibration, starts: list[Bool[ndarray, " m"]]
+) -> tuple[float, Bool[ndarray, " m"] | None]:
+    """The refined grouping with the least squares; no more starts where two have come to it.
+
+    A grouping in which some photographs have changed places can be far better than one camera for all and
+    still be the wrong one: refining moves single views, and does not undo a swap.
+    """
+    best: tuple[float, ndarray | None] = (np.inf, None)
+    for start in starts:
+        refined = _refined(together, start)
+        if refined is None:
+            continue
+        if best[1] is not None and len(np.unique(refined[1] ^ best[1])) == 1:
+            break  # another start ends where the best one did
+        if refined[0] < best[0]:
+            best = refined
+    return best
+
+
+def _agree_by_themselves(together: Calibration, second: Bool[ndarray, " m"]) -> bool:
+    """Whether each group agrees on one camera: halves of a zoom in many steps, or of photographs by a rolling
+    shutter, are better than the whole, but are no cameras.
+    """
+    for group in (np.flatnonzero(~second), np.flatnonzero(second)):
+        known = linearised(_fit(together, group))
+        if disagreement(known, together.detections.only(group)).certain:
+            return False
+    return True
+
+
+def _refined(together: Calibration, second: Bool[ndarray, " m"]) -> tuple[float, Bool[ndarray, " m"]] | None:
     """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no
     camera.
+
+    Args:
+        together: one camera for all, with a flat target: what each group's fit starts from.
     """
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
@@ -219,9 +250,7 @@ def _refined(
             break
         seen.add(second.tobytes())
         try:
-            squares = np.stack(
-                [_squares(detections, np.flatnonzero(group), base=base) for group in (~second, second)]
-            )
+            squares = np.stack([_squares(together, np.flatnonzero(group)) for group in (~second, second)])
         except CalibrationError:
             break
         total = float(np.where(second, squares[1], squares[0]).sum())
@@ -231,9 +260,9 @@ def _refined(
     return best
 
 
-def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndarray, " m"]:
+def _squares(together: Calibration, group: ndarray) -> Float[ndarray, " m"]:
     """Squared error of each view by a group's camera: left out where it is of the group."""
-    fit = _fit(detections.only(group), base=base)
+    detections, fit = together.detections, _fit(together, group)
     shape, camera = fit.shape, fit.estimate.camera
     poses = resect(camera, detections, shape=shape)
     squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
@@ -241,8 +270,13 @@ def _squares(detections: Detections, group: ndarray, *, base: str) -> Float[ndar
     return squares
 
 
-def _fit(detections: Detections, *, base: str) -> StepOneFit:
-    return fit_step_one(fit_flat(detections, lens=base), shape="free", first_lens=FREE)
+def _fit(together: Calibration, group: ndarray) -> StepOneFit:
+    start = replace(
+        together,
+        detections=together.detections.only(group),
+        camera_from_target=tuple(together.camera_from_target[i] for i in group),
+    )
+    return fit_step_one(start, shape="free", first_lens=FREE, tolerance=COMPARED_TOLERANCE)
 
 
 def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:

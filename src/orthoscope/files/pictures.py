@@ -19,8 +19,10 @@ from orthoscope.files.films import FILMS, frames_of, worth_looking_at
 from orthoscope.files.images import names_of, pages_in, photographs, read_image, to_grey
 from orthoscope.geometry.arrays import InputError, ndarray
 
-__all__ = ["MOVING", "Given", "Picture", "pictures"]
+__all__ = ["MOVING", "Given", "Picture", "file_name_of", "pictures"]
 
+# What stands between a film's name and a frame's time, and between a file's name and a page's number.
+AT, PAGE = "@", "#"
 # Files of many frames, of which some are looked at.
 MOVING = (*FILMS, *BAGS)
 
@@ -76,15 +78,24 @@ def pictures(given: Given, *, topic: str | None = None) -> list[Picture]:
     return found
 
 
+def file_name_of(picture: str) -> str:
+    """The name of the file that a frame or a page is of.
+
+    Args:
+        picture: the name of the frame or page.
+    """
+    return picture[: max(picture.rfind(AT), picture.rfind(PAGE))]
+
+
 def _of_file(name: str, file: Path, topic: str | None) -> list[Picture]:
     suffix = file.suffix.lower()
     if suffix in MOVING:
         frames = frames_of(file) if suffix in FILMS else worth_looking_at(pictures_in_bag(file, topic))
-        return [Picture(f"{name}@{frame.seconds:.3f}s", frame.picture) for frame in frames]
+        return [Picture(f"{name}{AT}{frame.seconds:.3f}s", frame.picture) for frame in frames]
     pages = pages_in(file)
     if pages < 2:
         return [Picture(name, file)]
-    return [Picture(f"{name}#{page + 1}", file, page) for page in range(pages)]
+    return [Picture(f"{name}{PAGE}{page + 1}", file, page) for page in range(pages)]
 
 
 def _checked(array: ndarray) -> ndarray:

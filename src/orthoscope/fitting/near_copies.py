@@ -6,6 +6,8 @@ left out together (leave_one_out.py) and count as one photograph.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from orthoscope.geometry.arrays import Int, ndarray
@@ -19,8 +21,10 @@ COPIED_PX = 1.0
 USUAL_WIDTH = 1000.0
 # With fewer corners in common two views cannot be compared.
 FEWEST_COMMON = 4
-# A few corners tell first which views may be copies at all.
+# So many corners tell first which views may be copies at all.
 FIRST_CORNERS = 16
+# A corner that moved by less than a cell lies in its own cell or in one of those around it.
+NEIGHBOURS = tuple(product((-1, 0, 1), repeat=2))
 
 
 def near_copies(detections: Detections) -> Int[ndarray, " m"]:
@@ -32,19 +36,22 @@ def near_copies(detections: Detections) -> Int[ndarray, " m"]:
     tables = np.full((views, corners, 2), np.nan)
     for table, view in zip(tables, detections.views, strict=True):
         table[view.ids] = view.pixels
-    first = np.unique(np.linspace(0, corners - 1, FIRST_CORNERS).round().astype(int))
-    number, kept = np.zeros(views, dtype=np.int64), np.zeros(views, dtype=np.int64)
-    count = 0
+    some = np.unique(np.linspace(0, corners - 1, FIRST_CORNERS).round().astype(int))
+    cells = np.floor(np.nan_to_num(tables[:, some], nan=-1e9) / near).astype(np.int64)
+    seen = np.isfinite(tables[:, some, 0])
+    number = np.zeros(views, dtype=np.int64)
+    kept: list[int] = []
+    at: dict[tuple[int, int, int], list[int]] = {}  # kept views by where they see a few corners
     for i in range(views):
-        gaps = np.abs(tables[kept[:count, None], first] - tables[i, first]).max(-1)
-        # common corners that are all far apart rule a copy out
-        perhaps = np.flatnonzero((gaps < near).any(1) | np.isnan(gaps).all(1))
-        same = [k for k in perhaps if _is_copy(tables[kept[k]], tables[i], near)]
-        if same:
-            number[i] = same[0]
-        else:
-            number[i], kept[count] = count, i
-            count += 1
+        places = [(int(k), int(cells[i, k, 0]), int(cells[i, k, 1])) for k in np.flatnonzero(seen[i])]
+        around = ((k, x + dx, y + dy) for k, x, y in places for dx, dy in NEIGHBOURS)
+        perhaps = {n for place in around for n in at.get(place, ())} if places else range(len(kept))
+        same = [n for n in sorted(perhaps) if _is_copy(tables[kept[n]], tables[i], near)]
+        number[i] = same[0] if same else len(kept)
+        if not same:
+            for place in places:
+                at.setdefault(place, []).append(len(kept))
+            kept.append(i)
     return number
 
 

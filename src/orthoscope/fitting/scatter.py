@@ -113,31 +113,26 @@ def _by_stretch(fit: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray
     """What is added to the camera's covariance where the shape's prior is no surer of stretch and shear than
     STRETCH_SHARE; nothing where views show them, or where the prior is no surer.
 
-    With w'x how much of a mode is in the unknowns, and H less `excess` w w': the Woodbury identity.
+    W'x is how much of each mode there is, P what the prior knows of them, D what the views know, so that
+    (W'H^-1 W)^-1 = D + P.  P - E in the place of P adds H^-1 W (E + E (D + P - E)^-1 E) W'H^-1.
     """
-    surface = fit.slopes.surface
-    r = surface.shape[1]
+    r, surface = fit.slopes.sizes[2], fit.slopes.surface
     if not r or fit.noise <= 0.0:
         return np.zeros((fit.of_camera, fit.of_camera))
     seen = np.any(surface != 0.0, axis=1)
     (x, y), zero = ((points[:, :2] - points[seen, :2].mean(0)) * seen[:, None]).T, np.zeros(len(points))
-    precision, ways, excess = fit.shape_precision[: 3 * r], [], []
-    for mode in (np.stack([x, -y, zero]), np.stack([y, x, zero])):
+    precision, W, known = fit.shape_precision[: 3 * r], np.zeros((fit.unknowns, 2)), np.zeros(2)
+    for i, mode in enumerate((np.stack([x, -y, zero]), np.stack([y, x, zero]))):
         unit = np.linalg.lstsq(surface, 0.5 * mode.T, rcond=None)[0].ravel()
-        known = float(unit @ (precision * unit))  # of the mode, by the prior
-        more = known - fit.noise / STRETCH_SHARE**2
-        if more > 0.0:
-            way = np.zeros(fit.unknowns)
-            way[fit.of_camera : fit.of_camera + 3 * r] = precision * unit / known
-            ways.append(way)
-            excess.append(more)
-    if not ways:
-        return np.zeros((fit.of_camera, fit.of_camera))
-    W = np.stack(ways, axis=1)
+        known[i] = unit @ (precision * unit)
+        W[fit.of_camera : fit.of_camera + 3 * r, i] = precision * unit / known[i]
     solved = fit.solved(W)
-    left = np.diag(1.0 / np.array(excess)) - W.T @ solved
+    excess = np.diag(np.maximum(known - fit.noise / STRETCH_SHARE**2, 0.0))
+    by_views, vectors = np.linalg.eigh(np.linalg.inv(W.T @ solved) - np.diag(known))
+    data = (vectors * np.maximum(by_views, 0.0)) @ vectors.T  # rounding may leave less than nothing
+    added = excess + excess @ np.linalg.solve(data + np.diag(known) - excess, excess)
     camera = solved[: fit.of_camera]
-    return fit.noise * camera @ np.linalg.solve(left, camera.T)
+    return fit.noise * camera @ (0.5 * (added + added.T)) @ camera.T
 
 
 def patterns_over_views(

@@ -1,22 +1,27 @@
 """The paper's section 4, from one command: every experiment, beside what the paper claims about it.
 
-part of the package, so that `orthoscope paper` runs wherever it is installed, yet
-using only what any user could, the public functions of the rooms below.
+Part of the package, so that `orthoscope paper` runs wherever it is installed, yet using only what any user
+could, the public functions of the rooms below.
 
-    entries    who is compared
-    subgrids      fewer corners of the same board
-    trials        one trial: data, calibration, NCE on training and on test views
-    members       eq. (7): which camera comes out for which damping
-    photographs   the same on real photographs
-    section4      all of it as one list of jobs
-    curves        many trials to means over a level
-    claims        what a claim is; claims_about_curves, claims_about_eq7: the paper's claims, judged; wording:
-    their words
-    figures_with_claims      figures and tables with their claims
-    figures       NCE against noise, points, images
-    page          everything as one HTML page
-    files         everything as CSV
-    documents     both, ready to be written
+    entries              who is compared: the paper's three, ours, a method of one's own
+    subgrids             fewer corners of the same board
+    trials               one trial: data, calibration, NCE on training and on test
+    eq7_searches         eq. (7): which camera comes out for which damping and weights
+    step_two             the lens from pairs by itself: degree, number of images
+    times                how long it takes
+    straightness         Fig. 7 as a number
+    photographs          the same on real photographs
+    section4             the parts, and all of them as one list of jobs
+    curves               many trials to means over a level
+    sentences            what the paper says, word for word
+    claims               what becomes of a sentence; claims_about_curves, _eq7, _steps: judged
+    wording              numbers and lists in words
+    first_figure         Fig. 1
+    figures_with_claims  figures with their claims; tables_with_claims: tables with theirs
+    figures              NCE against noise, points, images
+    page                 everything as one HTML page
+    files                everything as CSV
+    documents            both, ready to be written
 
 C. Ricolfe-Viala and A. J. Sánchez-Salmerón, Using the camera pin-hole model restrictions to calibrate the
 lens distortion model.

@@ -11,12 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["MAIN", "Claim", "ClaimVerdict", "main_headline", "of_sentence", "share"]
+from orthoscope.paper.sentences import BETTER, Sentence
 
-MAIN = (
-    "MLDC has a lower error on test data than FCCM, whose lens and pin-hole only compensate each other on"
-    " training data."
-)
+__all__ = ["Claim", "ClaimVerdict", "main_headline", "of_sentence", "share"]
 
 
 class ClaimVerdict(StrEnum):
@@ -41,7 +38,7 @@ class Claim:
     """
 
     where: str
-    paper: str
+    paper: Sentence
     verdict: ClaimVerdict
     finding: str
     ours: bool = False
@@ -63,10 +60,10 @@ def of_sentence(claims: Sequence[Claim]) -> ClaimVerdict:
 
 
 def main_headline(claims: Sequence[Claim]) -> str:
-    """One sentence for the top of the page, from the claims that MLDC is the better one on test data (MAIN),
-    as printed and repeated.
+    """One sentence for the top of the page, from the claims that MLDC is better on test data (BETTER), as
+    printed and repeated.
     """
-    told = [claim for claim in claims if claim.paper == MAIN and claim.verdict is not ClaimVerdict.OPEN]
+    told = [claim for claim in claims if claim.paper == BETTER and claim.verdict is not ClaimVerdict.OPEN]
     printed, repeated = ([claim for claim in told if claim.ours is ours] for ours in (False, True))
     if not printed:
         return "Whether MLDC is better than FCCM on test data cannot be told from this run."

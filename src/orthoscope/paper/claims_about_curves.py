@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import Bool, ndarray
-from orthoscope.paper.claims import MAIN, Claim, ClaimVerdict, share
+from orthoscope.paper import sentences
+from orthoscope.paper.claims import Claim, ClaimVerdict, share
 from orthoscope.paper.curves import Curve, Curves
 from orthoscope.paper.entries import FCCM, FCCM5, MLDC, NMLDC, REPEATED
 from orthoscope.paper.wording import each_of, joined_words, short_number, span, times
@@ -64,13 +65,13 @@ def better_on_test(where: str, curves: Curves, axis: Axis, *, mldc: str = MLDC) 
     """MLDC is more accurate than FCCM on data that was not used; mldc: which reading of it."""
     ours = mldc != MLDC
     if mldc not in curves or FCCM not in curves:
-        return Claim(where, MAIN, ClaimVerdict.OPEN, f"{mldc} was not tried beside FCCM.", ours)
+        return Claim(where, sentences.BETTER, ClaimVerdict.OPEN, f"{mldc} was not tried beside FCCM.", ours)
     both, (one, fccm) = _both(curves, mldc, FCCM)
     wins, of = int(_clearly_above(fccm, one)[both].sum()), int(both.sum())
     if not of:
         return Claim(
             where,
-            MAIN,
+            sentences.BETTER,
             ClaimVerdict.OPEN,
             f"At none of the {axis.levels} did both methods give a camera.",
             ours,
@@ -81,7 +82,9 @@ def better_on_test(where: str, curves: Curves, axis: Axis, *, mldc: str = MLDC) 
         f" {axis.levels}; on average it is {short_number(mine)} against"
         f" {short_number(theirs)}{times(mine, theirs)}."
     )
-    return Claim(where, MAIN, share(wins, of), finding + _true_poses(one, fccm) + _failed(one, fccm), ours)
+    return Claim(
+        where, sentences.BETTER, share(wins, of), finding + _true_poses(one, fccm) + _failed(one, fccm), ours
+    )
 
 
 def better_repeated(where: str, curves: Curves, axis: Axis) -> Claim:
@@ -91,7 +94,7 @@ def better_repeated(where: str, curves: Curves, axis: Axis) -> Claim:
 
 def compensated(where: str, curves: Curves, axis: Axis) -> Claim:
     """FCCM's errors are compensated on training data only; training and test views are both noisy."""
-    paper = "FCCM fits its training data; when the data change, the computed model no longer satisfies them."
+    paper = sentences.NO_LONGER_SATISFIED
     told, (fccm,) = _both(curves, FCCM)
     ratio = fccm.noisy_test_nce / np.where(fccm.training_nce > 0, fccm.training_nce, np.nan)
     told = told & np.isfinite(ratio)
@@ -110,7 +113,7 @@ def compensated(where: str, curves: Curves, axis: Axis) -> Claim:
 
 def same_on_test(where: str, curves: Curves, axis: Axis) -> Claim:
     """MLDC's error does not change with the data; training and test views are both noisy."""
-    paper = "With MLDC, when the data change the normalised error is similar."
+    paper = sentences.ALIKE_ON_TEST
     told, (mldc,) = _both(curves, MLDC)
     told = told & np.isfinite(mldc.noisy_test_nce)
     if not told.any():
@@ -127,7 +130,7 @@ def same_on_test(where: str, curves: Curves, axis: Axis) -> Claim:
 
 def most_sensitive(where: str, curves: Curves, axis: Axis) -> Claim:
     """NMLDC suffers most from noise; levels are sigma, pixels."""
-    paper = "NMLDC is more sensitive to pixel noise, because its errors cannot be compensated."
+    paper = sentences.MORE_SENSITIVE
     told, three = _both(curves, NMLDC, FCCM, MLDC)
     if told.sum() < 2:
         return Claim(
@@ -152,7 +155,7 @@ def most_sensitive(where: str, curves: Curves, axis: Axis) -> Claim:
 
 def greatest_error(where: str, curves: Curves, axis: Axis) -> Claim:
     """NMLDC is the worst of the three."""
-    paper = "Again NMLDC gives greater errors."
+    paper = sentences.GREATER_ERRORS
     told, three = _both(curves, NMLDC, FCCM, MLDC)
     if not told.any():
         return Claim(
@@ -176,7 +179,7 @@ def greatest_error(where: str, curves: Curves, axis: Axis) -> Claim:
 
 def better_trained(where: str, curves: Curves, axis: Axis) -> Claim:
     """FCCM has the lowest training error (Table 1); judged with all points."""
-    paper = "The FCCM method obtains better results in the training step."
+    paper = sentences.BETTER_TRAINED
     told, three = _both(curves, FCCM, NMLDC, MLDC)
     if not told.any():
         return Claim(where, paper, ClaimVerdict.OPEN, "Not all three methods gave a camera.")
@@ -193,7 +196,7 @@ def better_trained(where: str, curves: Curves, axis: Axis) -> Claim:
 
 def exact_without_noise(where: str, curves: Curves, axis: Axis) -> Claim:
     """Few points are enough where there is no noise; one level, the number of points."""
-    paper = "In the absence of noise, a small number of training points can yield 100 % accuracy."
+    paper = sentences.EXACT_WITHOUT_NOISE
     three = [curves[name] for name in (FCCM, NMLDC, MLDC)]
     told = {curve.name: float(curve.test_nce[0]) for curve in three if np.isfinite(curve.test_nce[0])}
     if not told:
@@ -208,10 +211,7 @@ def exact_without_noise(where: str, curves: Curves, axis: Axis) -> Claim:
 
 def accurate_from_three(where: str, curves: Curves, axis: Axis) -> Claim:
     """From three views on MLDC's camera is accurate; levels are numbers of views."""
-    paper = (
-        "With three images or more the result is always a set of points that satisfies the template and an"
-        " accurate camera model."
-    )
+    paper = sentences.ACCURATE_FROM_THREE
     told, (mldc,) = _both(curves, MLDC)
     enough = told & (mldc.levels >= 3)
     if not enough.any():
@@ -228,10 +228,7 @@ def accurate_from_three(where: str, curves: Curves, axis: Axis) -> Claim:
 
 def fewer_than_three(where: str, curves: Curves, axis: Axis) -> Claim:
     """From one or two views the assumptions may lead far off; levels are numbers of views."""
-    paper = (
-        "With fewer than three images the assumptions that the linear step needs can lead to a pin-hole far"
-        " away from the right one."
-    )
+    paper = sentences.FAR_FROM_FEW
     told, (mldc,) = _both(curves, MLDC)
     few, enough = told & (mldc.levels < 3), told & (mldc.levels >= 3)
     if not few.any() or not enough.any():

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from orthoscope.paper import sentences
 from orthoscope.paper.claims import Claim, ClaimVerdict, share
 from orthoscope.paper.eq7_searches import Eq7Search
 from orthoscope.paper.wording import span
@@ -24,7 +25,7 @@ ACCURATE_NCE = 1.0
 
 def perfect(where: str, members: Sequence[Eq7Search]) -> Claim:
     """The search of eq. (7) always satisfies the template's restrictions perfectly."""
-    paper = "The search always converges to points which satisfy all template restrictions perfectly."
+    paper = sentences.ALWAYS_PERFECT
     costs = np.array([member.J for member in members if member.literal])
     if not len(costs):
         return Claim(where, paper, ClaimVerdict.OPEN, "Eq. (7) was not searched.")
@@ -38,10 +39,7 @@ def perfect(where: str, members: Sequence[Eq7Search]) -> Claim:
 
 def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
     """Eq. (7) has one camera; members of one scene."""
-    paper = (
-        "The problem is over-constrained, so the points and the pin-hole are determined (eq. 8), and the"
-        " camera model is accurate."
-    )
+    paper = sentences.OVER_CONSTRAINED
     ends = [
         member.judgement
         for member in members
@@ -66,16 +64,15 @@ def determined(where: str, members: Sequence[Eq7Search]) -> Claim:
     )
     where_to = "one camera" if one else "different cameras"
     finding = (
-        f"{len(ends)} searches of the same data, all with J < {PERFECT_COST:g}, end at {where_to}: {of_each}"
-        " px, "
-        f"up to {apart:.2g} px apart; test NCE {span(nce)}."
+        f"{len(ends)} searches of the same data, all with J < {PERFECT_COST:g}, end at {where_to}:"
+        f" {of_each} px, up to {apart:.2g} px apart; test NCE {span(nce)}."
     )
     return Claim(where, paper, verdict, finding)
 
 
 def weights_do_not_matter(where: str, members: Sequence[Eq7Search]) -> Claim:
     """The outcome does not depend on the weights; members of one scene, those of one damping."""
-    paper = "The computed pin-hole model does not depend on the weights of the terms of eq. (7)."
+    paper = sentences.WEIGHTS
     weighed = [member for member in members if member.literal and "weights" in member.name]
     damped = {member.name.split(", weights")[0] for member in weighed}
     plain = [member for member in members if member.literal and member.name in damped]

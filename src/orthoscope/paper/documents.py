@@ -9,19 +9,23 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from orthoscope.paper.claims import main_headline
 from orthoscope.paper.curves import curves_of
 from orthoscope.paper.entries import every_lens, with_skew
 from orthoscope.paper.figures_with_claims import (
-    FigureWithClaims,
     figures_with_claims,
     on_photographs,
-    parameter_columns,
 )
 from orthoscope.paper.files import curves_csv, entries_csv, members_csv, table_csv, trials_csv
-from orthoscope.paper.page import paper_page
+from orthoscope.paper.first_figure import first_figure
+from orthoscope.paper.page import every_claim, paper_page
 from orthoscope.paper.photographs import straightened
 from orthoscope.paper.section4 import PARTS, SCENES, Results
+from orthoscope.paper.step_two import of_step_two
+from orthoscope.paper.tables_with_claims import parameter_columns
+from orthoscope.paper.times import Timing
 
 __all__ = ["Documents", "documents"]
 
@@ -42,7 +46,8 @@ def documents(results: Results, files: Mapping[str, Path] | None = None) -> Docu
     real = on_photographs(results)
     wanted = plan.only or PARTS
     fig7 = straightened(results.detections, files or {}) if results.detections and "fig7" in wanted else None
-    texts = {PAGE: paper_page(results, straightened=fig7)}
+    fig1 = first_figure(results, files or {}) if "fig1" in wanted else None
+    texts = {PAGE: paper_page(results, straightened=fig7, first=fig1)}
     texts |= {
         f"{exhibit.kind.name}.csv": curves_csv(exhibit.curves, exhibit.kind.axis.column)
         for exhibit in (*shown, *([real] if real else []))
@@ -55,22 +60,23 @@ def documents(results: Results, files: Mapping[str, Path] | None = None) -> Docu
         if plan.wants("lenses")
     }
     texts["methods.csv"] = entries_csv(plan.everyone(), seed=plan.seed)
+    if results.timings:
+        texts["times.csv"] = table_csv(Timing._fields, results.timings)
+    if fig1:
+        pairs = np.concatenate([fig1.detected, fig1.corrected], axis=1).tolist()
+        texts["fig1.csv"] = table_csv(("detected_x", "detected_y", "corrected_x", "corrected_y"), pairs)
     if results.members:
         texts["eq7.csv"] = members_csv(results.members)
     if real and "table1" in wanted:
         texts["table1.csv"] = _table1(results)
     texts["trials.csv"] = trials_csv(
-        results.outcomes, (*plan.everyone(), *every_lens(plan.lenses)), seed=plan.seed
+        results.outcomes, (*plan.everyone(), *every_lens(plan.lenses), *of_step_two()), seed=plan.seed
     )
     if results.on_photographs:
         texts["trials_photographs.csv"] = trials_csv(
             results.on_photographs, with_skew(plan.everyone()), seed=plan.seed
         )
-    return Documents(PAGE, _headline([*shown, *([real] if real else [])]), texts)
-
-
-def _headline(shown: list[FigureWithClaims]) -> str:
-    return main_headline([claim for exhibit in shown for claim in exhibit.claims])
+    return Documents(PAGE, main_headline(every_claim(results)), texts)
 
 
 def _table1(results: Results) -> str:

@@ -44,6 +44,8 @@ __all__ = [
 TOLD_SETTINGS: dict[str, Mapping[str, Any]] = {
     "decoupled": {"shape": "flat", "first_lens": "free"},
 }
+# A method that takes as long as all others together takes part in so many trials, and in one for every lens.
+FEW_TRIALS: dict[str, int] = {"decoupled": 2}
 FCCM, NMLDC, MLDC = "FCCM", "NMLDC, plain", "MLDC, eq. (7)"
 REPEATED, NEAREST, REPAIRED = "MLDC, repeated", "MLDC, nearest", "NMLDC, repaired"
 FCCM5, OWN_CENTRE = "FCCM 5 parameters", "FCCM pfet, own centre"
@@ -101,13 +103,19 @@ OURS = (
 def fair_peers() -> tuple[PaperEntry, ...]:
     """Ours: the paper's methods as they can be made to work, and methods that the paper does not know."""
     others = sorted(set(METHODS) - {entry.method for entry in (*PAPER, *OURS)})
-    return (*OURS, *(PaperEntry(name, name, TOLD_SETTINGS.get(name, {})) for name in others))
+    peers = (PaperEntry(name, name, TOLD_SETTINGS.get(name, {}), FEW_TRIALS.get(name)) for name in others)
+    return (*OURS, *peers)
 
 
 def every_lens(lenses: tuple[str, ...] = tuple(LENSES)) -> tuple[PaperEntry, ...]:
     """Every method that takes a lens with every lens, the coefficients free that a user gets by naming it."""
     return tuple(
-        PaperEntry(f"{method} {lens}", method, {"lens": lens, **TOLD_SETTINGS.get(method, {})})
+        PaperEntry(
+            f"{method} {lens}",
+            method,
+            {"lens": lens, **TOLD_SETTINGS.get(method, {})},
+            1 if method in FEW_TRIALS else None,
+        )
         for method in METHODS
         if "lens" in settings_of(method)
         for lens in lenses
@@ -138,7 +146,7 @@ def own_entry(text: str) -> PaperEntry:
         entry = parse_entry(what)
         return PaperEntry(name, entry.method, entry.settings)
     try:
-        function = getattr(importlib.import_module(module), attribute)
+        function: Any = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, ValueError) as error:
         raise InputError(
             f"--with {text!r} names no method ({error}); expected module:function with a function that takes"

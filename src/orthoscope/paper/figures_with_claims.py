@@ -8,36 +8,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from orthoscope.geometry.arrays import ndarray
 from orthoscope.paper import claims_about_curves, claims_about_eq7
-from orthoscope.paper.claims import Claim, ClaimVerdict
+from orthoscope.paper.claims import Claim
 from orthoscope.paper.claims_about_curves import Axis, Judge
 from orthoscope.paper.curves import Curves, curves_of
-from orthoscope.paper.entries import MLDC, PAPER
 from orthoscope.paper.photographs import STUDY as PHOTOGRAPHS
-from orthoscope.paper.photographs import obliqueness
 from orthoscope.paper.section4 import PAPER_NOISE_PX, SCENES, Results
 from orthoscope.paper.trials import Outcome
-from orthoscope.paper.wording import each_of
 
 __all__ = [
-    "Centre",
     "FigureWithClaims",
-    "ParameterColumn",
-    "centres",
     "eq7_claims",
     "fair_finding",
     "figures_with_claims",
     "on_photographs",
-    "parameter_columns",
-    "stable_centre",
     "without_noise",
 ]
 
-# A distortion centre that changes by less, pixels, from trial to trial is a stable one.
-STEADY_PX = 2.0
 
 NOISE = Axis("noise levels", "{:g} px of noise", column="noise_px", label="sigma (px)")
 POINTS = Axis("numbers of points", "{:g} points", column="points", label="points a view")
@@ -199,57 +186,6 @@ def eq7_claims(results: Results) -> tuple[Claim, ...]:
     return (claims_about_eq7.perfect("Eq. (7)", results.members), *of_scenes, *of_weights)
 
 
-@dataclass(frozen=True)
-class Centre:
-    """Where a method puts the distortion centre over the trials of a scene: means and standard deviations,
-    pixels.
-    """
-
-    scene: str
-    name: str
-    trials: int
-    x: tuple[float, float]
-    y: tuple[float, float]
-
-
-def centres(results: Results) -> list[Centre]:
-    """Of every method that has a centre of its own, at the paper's noise and all points."""
-    most = max((outcome.level for outcome in results.outcomes if outcome.study == "points"), default=0.0)
-    found = []
-    for scene in SCENES:
-        chosen = [o for o in results.outcomes if (o.study, o.scene, o.level) == ("points", scene, most)]
-        for name in dict.fromkeys(outcome.entry for outcome in chosen):
-            of_entry = [o.judgement for o in chosen if o.entry == name and not o.judgement.failure]
-            own = [j for j in of_entry if (j.centre_x, j.centre_y) != (j.cx, j.cy)]
-            if own and len(own) == len(of_entry):
-                x, y = np.array([(j.centre_x, j.centre_y) for j in own]).T
-                found.append(Centre(scene, name, len(own), (_mean(x), _spread(x)), (_mean(y), _spread(y))))
-    return found
-
-
-def stable_centre(results: Results) -> tuple[Claim, ...]:
-    """Whether MLDC's centre is the same over the trials, in each scene."""
-    paper = "The method guarantees stability also when the distortion centre is computed."
-    said = []
-    for scene in SCENES:
-        if not results.plan.wants("points", scene):
-            continue
-        of_scene = {centre.name: centre for centre in centres(results) if centre.scene == scene}
-        where, mldc = f"Section 5, {scene}", of_scene.get(MLDC)
-        spread = {name: max(centre.x[1], centre.y[1]) for name, centre in of_scene.items()}
-        if mldc is None or not np.isfinite(spread[MLDC]):
-            said.append(Claim(where, paper, ClaimVerdict.OPEN, "Fewer than two trials gave a centre."))
-            continue
-        verdict = ClaimVerdict.HOLDS if spread[MLDC] < STEADY_PX else ClaimVerdict.FAILS
-        finding = (
-            f"Over {mldc.trials} trials its centre is at ({mldc.x[0]:.1f}, {mldc.y[0]:.1f}) px; standard"
-            " deviations of the"
-            f" worse coordinate, px: {each_of(spread)}."
-        )
-        said.append(Claim(where, paper, verdict, finding))
-    return tuple(said)
-
-
 def fair_finding(results: Results) -> str:
     """FCCM with 5 parameters against the paper's three, at the noise of figs. 4 and 5, all points."""
     curves = {scene: curves_of(results.outcomes, study="points", scene=scene) for scene in SCENES}
@@ -258,48 +194,3 @@ def fair_finding(results: Results) -> str:
         level=float(max(columns * rows for columns, rows in results.plan.points)),
         noise_px=PAPER_NOISE_PX,
     )
-
-
-@dataclass(frozen=True)
-class ParameterColumn:
-    """A column of Table 1: mean errors, and of fx, fy, cu, cv (pixels) and gamma (degrees) mean and standard
-    deviation over the splits.
-    """
-
-    name: str
-    values: dict[str, tuple[float, float]]
-    training_nce: float
-    test_nce: float
-    failures: int
-
-
-def parameter_columns(results: Results) -> list[ParameterColumn]:
-    """Table 1, from all points; the paper's three first."""
-    most = max((outcome.level for outcome in results.on_photographs), default=0.0)
-    whole = [outcome for outcome in results.on_photographs if outcome.level == most]
-    names = list(dict.fromkeys([*(entry.name for entry in PAPER), *(outcome.entry for outcome in whole)]))
-    return [_parameters(name, [outcome for outcome in whole if outcome.entry == name]) for name in names]
-
-
-def _parameters(name: str, outcomes: Sequence[Outcome]) -> ParameterColumn:
-    given = [outcome.judgement for outcome in outcomes if not outcome.judgement.failure]
-    fx, fy, cx, cy, skew = np.array([(j.fx, j.fy, j.cx, j.cy, j.skew) for j in given]).reshape(-1, 5).T
-    columns = {"fx": fx, "fy": fy, "cu": cx, "cv": cy, "gamma": obliqueness(fx, skew)}
-    return ParameterColumn(
-        name,
-        {
-            key: (_mean(column), float(column.std(ddof=1)) if len(column) > 1 else float("nan"))
-            for key, column in columns.items()
-        },
-        _mean(np.array([j.training_nce for j in given])),
-        _mean(np.array([j.test_nce for j in given])),
-        len(outcomes) - len(given),
-    )
-
-
-def _spread(values: ndarray) -> float:
-    return float(values.std(ddof=1)) if len(values) > 1 else float("nan")
-
-
-def _mean(values: ndarray) -> float:
-    return float(values.mean()) if len(values) else float("nan")

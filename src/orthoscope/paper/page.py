@@ -2,12 +2,14 @@
 
 The text is paper.html.jinja, in the report's style (report/page.css) with paper.css; figures go in as SVG,
 photographs as data URIs. What the page concludes are findings (claims.py); nothing here or in the template
-knows how an experiment ends. The same results give the same bytes.
+knows how an experiment ends. The same results give the same bytes; times alone are no seed's.
 """
 
 from __future__ import annotations
 
+import re
 from functools import cache, partial
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,19 +21,29 @@ from orthoscope.paper.curves import curves_of
 from orthoscope.paper.entries import PAPER
 from orthoscope.paper.figures_with_claims import (
     FigureWithClaims,
-    ParameterColumn,
-    centres,
     eq7_claims,
     fair_finding,
     figures_with_claims,
     on_photographs,
-    parameter_columns,
-    stable_centre,
     without_noise,
 )
+from orthoscope.paper.first_figure import FirstFigure
 from orthoscope.paper.photographs import SPLIT_COUNT, Straightened
 from orthoscope.paper.section4 import PAPER_NOISE_PX, SCENES, Results
+from orthoscope.paper.sentences import Sentence
+from orthoscope.paper.tables_with_claims import (
+    ParameterColumn,
+    centres,
+    parameter_columns,
+    stable_centre,
+    step_two_claims,
+    step_two_rows,
+    straightened_claims,
+    time_claims,
+)
 from orthoscope.paper.trials import TEST_VIEWS, TRAINING_VIEWS
+from orthoscope.report.html import raw
+from orthoscope.report.page import closed_page
 from orthoscope.version import __version__
 
 if TYPE_CHECKING:
@@ -41,10 +53,8 @@ __all__ = ["paper_page"]
 
 # The paper's gamma is told with so many decimals.
 GAMMA_DECIMALS = 3
-# A figure is at least this high, inches.
-LEAST_FIGURE_HEIGHT = 2.6
-# Each claim beside a figure makes it so much higher, inches, so that both are about as high.
-HEIGHT_PER_CLAIM = 0.75
+# The signs of the markers in a legend.
+SIGNS = dict(zip("os^vPDX*hd><p", "●■▲▼✚◆✖★⬢♦▶◀⬟", strict=True))
 
 
 class Cell(NamedTuple):
@@ -54,32 +64,44 @@ class Cell(NamedTuple):
     best: bool = False
 
 
-def paper_page(results: Results, *, straightened: Straightened | None = None) -> str:
-    """The page as text; straightened: Fig. 7, where there are photographs."""
+def paper_page(
+    results: Results, *, straightened: Straightened | None = None, first: FirstFigure | None = None
+) -> str:
+    """The page as text.
+
+    Args:
+        results: of a run.
+        straightened: Fig. 7, where there are photographs.
+        first: Fig. 1.
+    """
     shown, real = figures_with_claims(results), on_photographs(results)
-    others = (*without_noise(results), *eq7_claims(results), *stable_centre(results))
-    every = [claim for exhibit in (*shown, *([real] if real else [])) for claim in exhibit.claims] + list(
-        others
-    )
-    verdicts = [of_sentence(claims) for _, claims in _summary(every)]
-    return _template().render(
+    summary = _summary(every_claim(results))
+    verdicts = [of_sentence(claims) for _, claims in summary]
+    body = _template().render(
         version=__version__,
         plan=results.plan,
         training_views=TRAINING_VIEWS,
         test_views=TEST_VIEWS,
         splits=SPLIT_COUNT,
         noise=PAPER_NOISE_PX,
-        headline=main_headline(every),
-        every=every,
-        summary=_summary(every),
+        headline=main_headline(every_claim(results)),
+        summary=summary,
         counts=[
             (verdict.value, number, _tone(verdict))
             for verdict in ClaimVerdict
             if (number := verdicts.count(verdict))
         ],
         sentences=len(verdicts),
+        fig1=_fig1(first),
         centres=_centres(results),
         stable=stable_centre(results),
+        step_two=[
+            (r.scene, r.name, f"{r.steps:.0f}", _nce(r.test_nce), *(fixed(c, 1) for c in r.centre))
+            for r in step_two_rows(results)
+        ],
+        of_step_two=step_two_claims(results),
+        timings=[(t.images, t.entry, t.unknowns, fixed(t.seconds, 2), t.steps) for t in results.timings],
+        of_times=time_claims(results),
         printed=[entry.name for entry in PAPER],
         failures=_failures(results),
         tone=_tone,
@@ -92,18 +114,34 @@ def paper_page(results: Results, *, straightened: Straightened | None = None) ->
         real=_figure(real) if real else None,
         detections=results.detections,
         fig7=_fig7(straightened),
+        of_fig7=straightened_claims(results),
         parameters=_parameters(parameter_columns(results)) if real else [],
     )
+    style = files("orthoscope.paper").joinpath("paper.css").read_text("utf-8")
+    return closed_page("The paper's experiments", [raw(body)], version=__version__, style=style)
+
+
+def every_claim(results: Results) -> list[Claim]:
+    """All that is judged of a run."""
+    real = on_photographs(results)
+    exhibits = (*figures_with_claims(results), *([real] if real else []))
+    tables = (without_noise, eq7_claims, stable_centre, step_two_claims, time_claims, straightened_claims)
+    return [claim for exhibit in exhibits for claim in exhibit.claims] + [
+        claim for table in tables for claim in table(results)
+    ]
 
 
 @cache
 def _template() -> Template:
     """The page's template, everything escaped that is put into it; imported late, as in report/page.py."""
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    loader = ChoiceLoader([PackageLoader("orthoscope", "paper"), PackageLoader("orthoscope", "report")])
     environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("orthoscope", "paper"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template("paper.html.jinja")
 
@@ -112,23 +150,57 @@ def _figure(exhibit: FigureWithClaims) -> dict[str, Any]:
     """What the template needs of a figure; matplotlib is imported late, since it takes its time."""
     from markupsafe import Markup
 
-    from orthoscope.paper.figures import nce_figure
+    from orthoscope.paper.figures import looks, nce_figure
     from orthoscope.report.figures import to_svg
 
     kind = exhibit.kind
-    drawn = nce_figure(
-        exhibit.curves,
-        level=kind.axis.label,
-        even=kind.even,
-        height=LEAST_FIGURE_HEIGHT + HEIGHT_PER_CLAIM * len(exhibit.claims),
-    )
+    panels = {
+        of: nce_figure(exhibit.curves, of=of, title=title, level=kind.axis.label, even=kind.even)
+        for of, title in (("training_nce", "NCE, training data"), ("test_nce", "NCE, test data"))
+    }
     return {
         "name": kind.name,
         "where": kind.where,
         "title": kind.title,
         "caption": kind.caption,
-        "svg": Markup(to_svg(drawn, kind.name)),
+        "svgs": [Markup(_without_styles(to_svg(drawn, f"{kind.name}-{of}"))) for of, drawn in panels.items()],
+        "looks": [(look, SIGNS[look.marker]) for look in looks(tuple(exhibit.curves))],
         "claims": exhibit.claims,
+    }
+
+
+def _without_styles(svg: str) -> str:
+    """The same drawing with attributes in the place of styles, which the page's policy forbids; its type is
+    the sheet's.
+    """
+
+    def attributes(found: re.Match[str]) -> str:
+        pairs = [part.partition(":") for part in found[1].split(";") if part.strip()]
+        return "".join(
+            f' {name.strip()}="{value.strip()}"' for name, _, value in pairs if name.strip() != "font-family"
+        )
+
+    return re.sub(r' style="([^"]*)"', attributes, svg)
+
+
+def _fig1(first: FirstFigure | None) -> dict[str, Any] | None:
+    """The photograph and both kinds of points, with a border wide enough for all."""
+    if first is None:
+        return None
+    from orthoscope.report.pictures import BYTES_OF_LARGE, LARGE_WIDTH, picture_uri
+
+    height, width = first.photograph.shape[:2]
+    corners = np.concatenate([first.corrected, [[0.0, 0.0], [width, height]]])
+    low, high = np.floor(corners.min(0) - 6), np.ceil(corners.max(0) + 6)
+    pairs = zip(first.detected.tolist(), first.corrected.tolist(), strict=True)
+    return {
+        "name": first.name,
+        "rendered": first.rendered,
+        "photograph": picture_uri(first.photograph, LARGE_WIDTH, BYTES_OF_LARGE),
+        "size": (width, height),
+        "box": " ".join(f"{value:.0f}" for value in (*low, *(high - low))),
+        "pairs": [[f"{value:.2f}" for value in (*one, *other)] for one, other in pairs],
+        "farthest": fixed(float(np.hypot(*(first.corrected - first.detected).T).max()), 1),
     }
 
 
@@ -151,7 +223,7 @@ def _fig7(straightened: Straightened | None) -> dict[str, Any] | None:
     }
 
 
-def _summary(every: list[Claim]) -> list[tuple[str, list[Claim]]]:
+def _summary(every: list[Claim]) -> list[tuple[Sentence, list[Claim]]]:
     """Claims by what the paper says, which it may say of several figures."""
     return [
         (sentence, [claim for claim in every if claim.paper == sentence])
@@ -237,23 +309,21 @@ def _lenses(results: Results) -> list[tuple[str, str, list[Cell], str]]:
 
 
 def _parameters(table: list[ParameterColumn]) -> list[tuple[str, list[str]]]:
-    """Table 1 as the paper prints it, a row for each parameter and a column for each method, the names
-    first.
-    """
-    rows = [("", [column.name for column in table])]
-    labels = {"fx": "fx (px)", "fy": "fy (px)", "cu": "cu (px)", "cv": "cv (px)", "gamma": "gamma (deg)"}
-    for key, label in labels.items():
-        decimals = GAMMA_DECIMALS if key == "gamma" else 2
-        rows.append(
-            (
-                label,
-                [_with_spread(column.values[key], decimals) for column in table],
-            )
+    """Table 1 turned over, so that it fits a page: a row for each method, the names of the numbers first."""
+    decimals = {"fx": 2, "fy": 2, "cu": 2, "cv": 2, "gamma": GAMMA_DECIMALS}
+    units = [f"{key} ({'deg' if key == 'gamma' else 'px'})" for key in decimals]
+    return [("", [*units, "training NCE", "test NCE", "no camera"])] + [
+        (
+            column.name,
+            [
+                *(_with_spread(column.values[key], digits) for key, digits in decimals.items()),
+                _nce(column.training_nce),
+                _nce(column.test_nce),
+                str(column.failures),
+            ],
         )
-    rows.append(("Training error (NCE)", [_nce(column.training_nce) for column in table]))
-    rows.append(("Testing error (NCE)", [_nce(column.test_nce) for column in table]))
-    rows.append(("Splits without a camera", [str(column.failures) for column in table]))
-    return rows
+        for column in table
+    ]
 
 
 def _nce(value: float) -> str:

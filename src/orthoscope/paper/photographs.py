@@ -8,7 +8,8 @@ Pixel axes may be oblique, as in the paper's Table 1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +17,10 @@ import numpy as np
 
 from orthoscope.files.images import read_image
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
+from orthoscope.methods.plumb_line.photographs import lens_of_photographs
+from orthoscope.models.camera import Camera
 from orthoscope.paper.entries import OURS, PAPER, REPEATED, PaperEntry, with_skew
+from orthoscope.paper.straightness import bent_px
 from orthoscope.paper.subgrids import on_subgrid, subgrids
 from orthoscope.paper.trials import Outcome, Trial, trial_judged
 from orthoscope.straight.undistort import undistort
@@ -37,7 +41,12 @@ __all__ = [
 # One photograph in so many is for testing, as the paper's 5 of 20.
 SPLIT_COUNT = 4
 STUDY = "photographs"
-REPEATED_ENTRY = next(entry for entry in OURS if entry.name == REPEATED)
+# Fig. 7 shows these beside the paper's methods, and what edges alone give.
+SHOWN_BESIDE = (
+    next(entry for entry in OURS if entry.name == REPEATED),
+    PaperEntry("hartley_kang", "hartley_kang", {}),
+)
+PLUMB_LINE = "plumb line, edges alone"
 # With fewer photographs a split tests on a single one.
 FEWEST_PHOTOGRAPHS = 8
 
@@ -113,13 +122,30 @@ def straightened(detections: Detections, files: Mapping[str, Path]) -> Straighte
     chosen = max(views, key=lambda view: float(np.hypot(*(view.pixels - middle).T).mean()))
     image = read_image(files[chosen.image], grey=False)
     pictures: list[tuple[str, ndarray | str]] = []
-    for entry in with_skew((*PAPER, REPEATED_ENTRY)):
+    makers: dict[str, Callable[[], Camera]] = {
+        entry.name: partial(_camera_of, entry, training) for entry in with_skew((*PAPER, *SHOWN_BESIDE))
+    }
+    makers[PLUMB_LINE] = partial(
+        _camera_of_edges, [files[v.image] for v in training.views if v.image in files]
+    )
+    for name, make in makers.items():
         try:
-            camera = entry.calibrate(training).camera
-            pictures.append((entry.name, undistort(image, camera)))
+            camera = make()
+            pictures.append(
+                (f"{name}: {bent_px(camera, test):.3f} px off straight", undistort(image, camera))
+            )
         except (CalibrationError, InputError) as error:
-            pictures.append((entry.name, str(error)))
+            pictures.append((name, str(error)))
     return Straightened(chosen.image, image, tuple(pictures))
+
+
+def _camera_of(entry: PaperEntry, training: Detections) -> Camera:
+    return entry.calibrate(training).camera
+
+
+def _camera_of_edges(paths: list[Path]) -> Camera:
+    """The plumb line's, which needs no corners: of the edges in photographs, whatever they show."""
+    return lens_of_photographs(paths).camera
 
 
 def obliqueness(fx: Float[ndarray, "*n"], skew: Float[ndarray, "*n"]) -> Float[ndarray, "*n"]:

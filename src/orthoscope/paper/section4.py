@@ -19,7 +19,9 @@ from orthoscope.models.lenses import LENSES
 from orthoscope.paper.entries import PAPER, PaperEntry, every_lens, fair_peers
 from orthoscope.paper.eq7_searches import ALIKE, DAMPINGS, WEIGHTS, Eq7Search, member, rivals
 from orthoscope.paper.photographs import SPLIT_COUNT, check_views, grids_of, split_outcomes
+from orthoscope.paper.step_two import of_step_two
 from orthoscope.paper.subgrids import subgrids
+from orthoscope.paper.times import Timing, timings
 from orthoscope.paper.trials import TRAINING_VIEWS, Condition, Outcome, Study, trial_outcomes
 from orthoscope.simulation.scene import PAPER_FILL
 from orthoscope.targets.detections import Detections
@@ -55,9 +57,10 @@ class Part(NamedTuple):
 
 
 # Studies that are not curves over trials of the simulation.
-SEARCHES, ON_PHOTOGRAPHS = "eq7", "photographs"
+SEARCHES, TIMES, FIRST, ON_PHOTOGRAPHS = "eq7", "times", "fig1", "photographs"
 # The figures and tables by the names of their files; whoever asks for some of them gets the studies of these.
 PARTS = {
+    "fig1": Part(FIRST, ()),
     "fig2": Part("noise", SCENES[:1]),
     "fig3": Part("noise", SCENES[1:]),
     "fig4": Part("points", SCENES[:1]),
@@ -65,6 +68,8 @@ PARTS = {
     "images_low": Part("images", SCENES[:1]),
     "images_high": Part("images", SCENES[1:]),
     "exact": Part("exact", SCENES),
+    "step2": Part("step2", SCENES),
+    "times": Part(TIMES, SCENES[:1]),
     "lenses": Part("lenses", SCENES),
     "eq7": Part(SEARCHES, SCENES),
     "fig6": Part(ON_PHOTOGRAPHS, ()),
@@ -78,7 +83,7 @@ class Plan:
     """How much is run.
 
     Attributes:
-        trials: of figs. 2 to 5 and of the number of images; fewer for tables.
+        trials: of figs. 4 and 5, where the paper has 25; fewer of the others.
         seed: of everything random.
         board: the sub-grid of the paper's board that all but the points' studies use, None for all of it.
         noise_px: levels of figs. 2 and 3.
@@ -89,7 +94,9 @@ class Plan:
         weights: of eq. (7), beside 1, 1, 1.
         eq7: what data it is searched on.
         grids: how many of the photographed board.
-        most_table_trials: of the table of lenses and of the noise-free check.
+        most_trials: of figs. 2 and 3 and of the number of images, for which the paper names no number.
+        most_table_trials: of the tables and of the noise-free check.
+        timed: numbers of images that are timed.
         only: names of PARTS to run, all of them where none is named.
         own: methods of the user's own, which take part in every figure.
         tilt: least and greatest of the simulated views, radians.
@@ -102,7 +109,7 @@ class Plan:
     trials: int = 25
     seed: int = 0
     board: tuple[int, int] | None = None
-    noise_px: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
+    noise_px: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
     points: tuple[tuple[int, int], ...] = subgrids(PAPER_BOARD, GRID_COUNT)
     images: tuple[int, ...] = (1, 2, 3, 4, 5, 7, 10, 15)
     lenses: tuple[str, ...] = tuple(LENSES)
@@ -110,7 +117,9 @@ class Plan:
     weights: tuple[tuple[float, float, float], ...] = WEIGHTS
     eq7: Condition = Condition(PAPER_NOISE_PX)
     grids: int = GRID_COUNT
-    most_table_trials: int = 5
+    most_trials: int = 8
+    most_table_trials: int = 3
+    timed: tuple[int, ...] = (3, 5, 10, 15)
     only: tuple[str, ...] = ()
     own: tuple[PaperEntry, ...] = ()
     tilt: tuple[float, float] = (0.0, np.pi / 4)
@@ -147,6 +156,7 @@ class Plan:
             "eq7": Condition(PAPER_NOISE_PX, (5, 7), 5),
             "grids": 2,
             "most_table_trials": 1,
+            "timed": (),
         }
         return cls(**few | changes)
 
@@ -191,21 +201,25 @@ class Plan:
         )
         exact = Study("exact", sizes[:1], (at(0.0, self.points[0]),), everyone)
         lenses = Study("lenses", (PAPER_NOISE_PX,), (at(subgrid=self.board),), every_lens(self.lenses))
+        step2 = Study("step2", (PAPER_NOISE_PX,), (at(subgrid=self.board),), of_step_two())
+        some = min(self.trials, self.most_trials)
         return (
-            *((study, self.trials) for study in (noise, points, images)),
-            *((study, self.table_trials) for study in (exact, lenses)),
+            (points, self.trials),
+            *((study, some) for study in (noise, images)),
+            *((study, self.table_trials) for study in (exact, lenses, step2)),
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """What came out: every trial of the simulations, the cameras of eq. (7), every split of the photographs
-    (none without photographs).
+    """What came out: every trial of the simulations, the cameras of eq. (7), times, every split of the
+    photographs (none without photographs).
     """
 
     plan: Plan
     outcomes: Sequence[Outcome]
     members: Sequence[Eq7Search]
+    timings: Sequence[Timing]
     on_photographs: Sequence[Outcome]
     detections: Detections | None
 
@@ -264,12 +278,19 @@ def run(
         if detections and plan.wants(ON_PHOTOGRAPHS)
         else []
     )
-    # long jobs first: no one waits for the last
-    done = _done((*eq7, *real, *simulated), executor, progress)
-    first, second = len(eq7), len(eq7) + len(real)
-    return Results(
-        plan, _joined(done[second:]), _joined(done[:first]), _joined(done[first:second]), detections
+    timed = (
+        [
+            partial(timings, plan.condition(subgrid=plan.board, views=count), seed=plan.seed)
+            for count in plan.timed
+        ]
+        if plan.wants(TIMES)
+        else []
     )
+    # Long jobs come first: no one waits for the last.
+    kinds = (eq7, timed, real, simulated)
+    done = iter(_done([job for jobs in kinds for job in jobs], executor, progress))
+    members, times, on_photographs, outcomes = (_joined([next(done) for _ in jobs]) for jobs in kinds)
+    return Results(plan, outcomes, members, times, on_photographs, detections)
 
 
 def _members(

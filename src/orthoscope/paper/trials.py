@@ -29,6 +29,7 @@ from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.paper.entries import PaperEntry
+from orthoscope.paper.straightness import bent_px
 from orthoscope.paper.subgrids import on_subgrid
 from orthoscope.simulation.scene import PAPER_FILL, Scene, paper_scene, simulate_detections
 from orthoscope.targets.detections import Detections
@@ -107,6 +108,8 @@ class Judgement(NamedTuple):
         unseen: the share of test corners without a ray.
         centre_x, centre_y: of distortion.
         lens: its coefficients, as `name=value name=value`.
+        steps: of the search, or rounds.
+        bent_px: how far rows and columns of the noisy test views are off straight lines, straightened.
     """
 
     training_nce: float = NOWHERE
@@ -123,6 +126,8 @@ class Judgement(NamedTuple):
     centre_x: float = NOWHERE
     centre_y: float = NOWHERE
     lens: str = ""
+    steps: float = NOWHERE
+    bent_px: float = NOWHERE
 
 
 class Outcome(NamedTuple):
@@ -169,6 +174,8 @@ def trial_judged(entry: PaperEntry, trial: Trial) -> Judgement:
         centre_x=frame.cx,
         centre_y=frame.cy,
         lens=" ".join(f"{name}={value:.6g}" for name, value in coefficients.items() if value),
+        steps=float(calibration.steps),
+        bent_px=bent_px(camera, trial.noisy_test),
     )
 
 

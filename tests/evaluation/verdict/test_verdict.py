@@ -190,8 +190,11 @@ def test_a_camera_that_is_open_far_away_still_serves_where_the_target_was():
 
 
 def test_what_a_shutter_did_is_in_the_error_and_the_camera_is_one():
-    verdict = verdict_on(Situation(**FAULTS["shutter"]))
+    little = Situation(**FAULTS["shutter"] | {"differ_px": 0.2})
+    verdict = verdict_on(little)
     assert (verdict.grade, verdict.cause) == (Grade.GOOD, "photographs")
+    # a zoom may look like a shutter: what the cameras differ by counts as well
+    assert verdict_on(replace(little, differ_px=1.5)).grade == Grade.USABLE
     assert "one camera" not in verdict.limit
 
 

@@ -42,7 +42,8 @@ def test_what_is_kept_is_the_same_whatever_it_was_compared_with(photographs: Det
 
 def test_many_views_are_fitted_by_way_of_some(photographs: Detections, monkeypatch: pytest.MonkeyPatch):
     straight = Kept(photographs, skew=False).step_one(RICHEST)
-    monkeypatch.setattr(fitters, "ENOUGH_VIEWS", 8)
+    monkeypatch.setattr(fitters, "CHOICE_VIEWS", 8)
+    monkeypatch.setattr(fitters, "CHOICE_CORNERS", 0)
     some_first = Kept(photographs, skew=False).step_one(RICHEST)
     assert some_first.views == 12
     deviations = np.sqrt(np.diag(straight.covariance))

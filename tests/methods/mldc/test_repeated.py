@@ -15,6 +15,7 @@ from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate
 from orthoscope.methods.fccm import fccm
 from orthoscope.methods.mldc.mldc import mldc
+from orthoscope.methods.mldc.repeated import Ended
 from orthoscope.methods.own_centre import with_own_centre
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.difference import image_difference
@@ -127,3 +128,22 @@ def test_the_uncertainty_of_camera_and_centre_is_that_of_repeated_simulations():
     )
     ratio = values.std(0, ddof=1) / said.mean(0)
     assert ((ratio > 0.5) & (ratio < 1.8)).all()  # 11 degrees of freedom: within 1.6 in 99 % of experiments
+
+
+def test_the_status_tells_a_cost_that_rose_and_a_direction_that_is_open_from_rounds_cut_short():
+    settled = Ended(5, 1e-8, 1e-7, 0.97)
+    assert settled.status == "converged"
+    assert "raised the cost by 0.001" in settled._replace(raised=1e-3).status
+    assert "leave a direction of the lens open" in Ended(60, 1e-3, np.inf, 1.0).status
+    assert "1 px are to go" in Ended(60, 1e-2, 1.0, 0.99).status
+
+
+@pytest.mark.parametrize("lens", ["pfet", "fet", "fov"])
+def test_the_stretch_is_the_only_direction_that_the_images_leave_open(lens):
+    """With it taken out every eigenvalue is below 1, whatever the formula calls its size; 'fet' too
+    converges.
+    """
+    found = mldc(simulated("low", Condition(0.1, (6, 9)), seed=0, trial=0)[0], lens=lens)
+    assert found.status == "converged"
+    usual = fccm(found.detections, lens=lens, own_centre=True)
+    assert found.rms_px < 1.001 * usual.rms_px

@@ -41,7 +41,9 @@ def streets(truth: Camera, count: int, seed: int = 0) -> list[Edge]:
     return [edge for i in range(count) for edge in edges_of(street_photograph(truth, rng=rng), i)]
 
 
-@pytest.mark.parametrize("lens", [BARREL, Division(l=-0.35), Brown()])
+@pytest.mark.parametrize(
+    "lens", [BARREL, *(pytest.param(lens, marks=pytest.mark.slow) for lens in (Division(l=-0.35), Brown()))]
+)
 def test_three_streets_tell_the_lens_within_a_pixel_over_the_frame(lens):
     truth = street_camera(lens)
     found = lens_of_edges(streets(truth, 3), SIZE)

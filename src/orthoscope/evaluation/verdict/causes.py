@@ -8,7 +8,7 @@ have.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import isnan
+from math import hypot, isnan
 from typing import NamedTuple
 
 from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade
@@ -29,6 +29,8 @@ NOTICED_SHARE = 0.5
 NEGLIGIBLE_DIFFERENCE_PX = 0.05
 # A free lens may miss up to this share of the corners' noise.
 STIFF_SHARE = 0.5
+# What a formula misses, where it is a smaller share of the camera's error, limits nothing.
+PART_SHARE = 0.25
 # Chance makes hardly so large a share of the corners wild.
 WILD_SHARE = 0.005
 # With corners in less than this share of the frame's cells, it is corners that are missing.
@@ -68,14 +70,18 @@ def _matters(s: Situation) -> bool:
 
 
 def _lens_is_missed(s: Situation) -> bool:
-    """A free lens is as stiff as its data made it, and misses a little of every lens by intent."""
-    return s.lens_px > (STIFF_SHARE * s.noise_px if s.lens == "free" else 0.0)
+    """A free lens is as stiff as its data made it, and misses a little of every lens by intent; what a
+    formula misses is named where it shows beside the noise or is a good part of the camera's error.
+    """
+    if s.lens == "free":
+        return s.lens_px > STIFF_SHARE * s.noise_px
+    return s.lens_px > min(STIFF_SHARE * s.noise_px, PART_SHARE * s.error_px)
 
 
 def _of_photographs(s: Situation) -> Grade:
     apart = 2.0 * s.differ_px if s.groups else s.differ_px
-    if s.disagree == "shutter" and not s.groups:  # the camera is one; what the shutter did is in its error
-        return _as_far_as_it_goes(s)
+    if s.disagree == "shutter" and not s.groups:  # the camera is one, unless it zoomed and only seems sheared
+        return Grade.GOOD if hypot(s.error_px, s.differ_px) <= FINE_PX else Grade.USABLE
     return Grade.NO if apart > s.coarse_px else Grade.USABLE
 
 

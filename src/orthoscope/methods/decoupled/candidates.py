@@ -46,9 +46,8 @@ class Candidates:
         self._fitter = fitter or Kept(detections, skew=skew)
         self.flat, self.step_one = cache(self._fitter.flat), cache(self._fitter.step_one)
         # Large, of many views; what is asked for of one model is asked for together.
-        self.linearised, self.left_out = (
-            lru_cache(maxsize=1)(make) for make in (self._linearised, self._left_out)
-        )
+        self.linearised = lru_cache(maxsize=1)(self._linearised)
+        self.left_out = lru_cache(maxsize=1)(self._left_out)
         self.from_pairs, self.scatter = cache(self._from_pairs), cache(self._scatter)
         self.residuals = cache(self._residuals)
 

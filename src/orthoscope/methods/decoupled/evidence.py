@@ -24,6 +24,7 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Variances
 from orthoscope.fitting.reprojection import POSE
+from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.methods.decoupled.normal_equations import SPACE, spline_unknowns
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known, Precisions
 from orthoscope.models.target_shape import polynomials
@@ -47,6 +48,10 @@ MOST_BEND = 0.1
 SETTLED_SHARE = 0.01
 # The patterns have these orders: a pose takes those below, and waves are single corners' matter.
 SMOOTH_ORDERS = (2, 3, 4)
+# The squares that are left may be less than nothing by this share of the cost, by rounding.
+ROUNDING_SHARE = 1e-9
+# Without noise the squares that are left count as so much, px^2.
+LEAST_SQUARES = 1e-24
 PLANE, HEIGHT = slice(None, 2), slice(2, None)
 
 
@@ -99,12 +104,19 @@ class Evidence:
         return Precisions(surface, self.noise / np.array(self.singles), smooth / self.bend)
 
     def renewed(self, problem: Joint, unknowns: DecoupledEstimate, cost: float, known: Known) -> Evidence:
-        """The variances that an estimate, its cost and what the data determined of it speak for."""
+        """The variances that an estimate, its cost and what the data determined of it speak for.
+
+        Raises:
+            CalibrationError: the estimate leaves errors that are no number.
+        """
         observations = problem.measurements.observations
         bend_cost, surface_cost, single_cost = problem.penalties(unknowns)
         determined = len(problem.free) + known.spline + float(known.surface.sum() + known.singles.sum())
         freedom = 2 * observations.corners - POSE * len(observations.order) - determined
-        noise = (cost - bend_cost - surface_cost - single_cost) / max(freedom, 1.0)
+        left = cost - bend_cost - surface_cost - single_cost
+        if not left > -ROUNDING_SHARE * cost:  # not a number too: nothing was fitted
+            raise CalibrationError("the photographs leave this model so open that its errors are no number.")
+        noise = max(left, LEAST_SQUARES) / max(freedom, 1.0)
         low, high = (LEAST_SHARE * self.size) ** 2, (MOST_SHARE * self.size) ** 2
         surface = [
             _variance(unknowns.surface[:, part], known.surface[:, part], low, high)

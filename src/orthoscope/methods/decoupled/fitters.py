@@ -21,8 +21,10 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["Compared", "Fitter", "Kept", "some_of"]
 
-# The choice from so many views, spread as widely as all, is that of all.
-ENOUGH_VIEWS = 40
+# A choice needs no more than so many corners in views that are spread as widely as all.
+CHOICE_CORNERS = 12000
+# It needs so many views, however many corners they have.
+CHOICE_VIEWS = 40
 # A fit that is compared with others ends at this tolerance: a share of squared errors that no rule sees.
 COMPARED_TOLERANCE = 1e-4
 
@@ -30,7 +32,7 @@ COMPARED_TOLERANCE = 1e-4
 class Fitter(Protocol):
     """Fits models of step 1."""
 
-    def flat(self, base: str) -> Calibration:
+    def flat(self, base: str, /) -> Calibration:
         """With a flat target and this formula.
 
         Raises CalibrationError where the views cannot tell them.
@@ -44,7 +46,8 @@ class Fitter(Protocol):
 
 def some_of(detections: Detections) -> Detections:
     """The views that a choice is made from, and a fit of all starts from."""
-    return representative(detections, ENOUGH_VIEWS)
+    views = len(detections.views) * CHOICE_CORNERS // max(detections.corners, 1)
+    return representative(detections, max(views, CHOICE_VIEWS))
 
 
 class Compared:

@@ -48,7 +48,7 @@ from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
 
-__all__ = ["Ended", "Rounds", "joint_parameters", "repeat"]
+__all__ = ["Ended", "Rounds", "in_gauge", "joint_parameters", "repeat"]
 
 # Where a round moves corners by less, and less is still to go, px rms, nothing changes any more.
 SETTLED_PX = 1e-6
@@ -62,6 +62,13 @@ STAGES: tuple[tuple[str, ...], ...] = (("a3",), ("a3", "a5"))
 STAGED_ROUNDS = 8
 
 
+# A plain round that raises the cost by more than this share is none of numbers' roundings.
+RAISED_SHARE = 1e-9
+# An eigenvalue of M this near to 1 is a direction in which nothing is known; the stretch, whose is 1, is
+# taken out.
+OPEN_MARGIN = 1e-6
+
+
 class Ended(NamedTuple):
     """How the rounds ended.
 
@@ -70,12 +77,14 @@ class Ended(NamedTuple):
         moved_px: what the last moved the corners by, rms.
         way_px: what was still to go then, rms.
         rate: by which the plain rounds' steps shrink, the largest eigenvalue of M.
+        raised: the share by which a plain round raised the cost, which in exact numbers it cannot.
     """
 
     rounds: int
     moved_px: float
     way_px: float
     rate: float
+    raised: float = 0.0
 
     @property
     def settled(self) -> bool:
@@ -85,14 +94,23 @@ class Ended(NamedTuple):
     @property
     def status(self) -> str:
         """A sentence."""
+        if self.raised > RAISED_SHARE:
+            return (
+                f"stopped after {self.rounds} rounds: a plain round raised the cost by {self.raised:.1g}"
+                " of it, which both steps cannot; the corners have no minimum nearby. Take more"
+                " photographs or another lens"
+            )
         if self.settled:
             return Status.CONVERGED.value
+        if self.rate > 1.0 - OPEN_MARGIN:
+            return (
+                f"stopped after {self.rounds} rounds: steps of plain rounds do not shrink ({self.rate:.6f}"
+                " each), so the views leave a direction of the lens open; free fewer coefficients"
+            )
         return (
-            f"stopped after {self.rounds} rounds: a round still moves the corners by {self.moved_px:.2g} px,"
-            " and"
-            f" {self.way_px:.2g} px are to go (the steps of plain rounds shrink by {self.rate:.4f} each);"
-            " allow more"
-            " rounds"
+            f"stopped after {self.rounds} rounds: a round still moves the corners by {self.moved_px:.2g}"
+            f" px, and {self.way_px:.2g} px are to go (the steps of plain rounds shrink by {self.rate:.4f}"
+            " each); allow more rounds"
         )
 
 
@@ -154,7 +172,7 @@ def repeat(
         start = _through_stages(bases, nearest, lens, loss)
     else:
         fit = fit_centred_lens(*pairs, pinhole=nearest.camera, lens=lens, loss=loss)
-        start = Estimate(_in_gauge(fit.unknowns, bases.narrowing.free), nearest.poses)
+        start = Estimate(in_gauge(fit.unknowns, bases.narrowing.free), nearest.poses)
     own = _Repetition(bases, joint_parameters(bases.narrowing.free, lens), loss)
     return own.run(start, rounds, progress)
 
@@ -177,7 +195,7 @@ def _through_stages(bases: StartingCameras, nearest: Estimate, lens: str, loss: 
     return here
 
 
-def _in_gauge(camera: Camera, of_pinhole: Sequence[str]) -> Camera:
+def in_gauge(camera: Camera, of_pinhole: Sequence[str]) -> Camera:
     """The same image with slope 1 at the centre: K stretched about it instead, so far as K's parameters"
     " move."""
     name, frame = GAUGE.get(type(camera.lens)), camera.lens_frame
@@ -223,9 +241,8 @@ class _Repetition:
         if here is None:
             raise CalibrationError(
                 "the corrected points cannot be told from these corners: no pin-hole with the lens of the"
-                " first step 2"
-                " sees them. Take more photographs, or use a lens with fewer coefficients, as in --lens"
-                " pfet:a1,a3."
+                " first step 2 sees them. Take more photographs, or use a lens with fewer coefficients,"
+                " as in --lens pfet:a1,a3."
             )
         for number in range(1, rounds + 1):
             sums = self._of_all.linearise(here.estimate, self._loss)
@@ -235,7 +252,11 @@ class _Repetition:
                 progress(number, here.cost)
             if ended.settled or number == rounds:
                 return Rounds(here.estimate, here.cost, ended, sums)
+            last = here.cost
             before, here = self._onward(before, here, way)
+            if here.cost > last * (1.0 + RAISED_SHARE):
+                raised = here.cost / last - 1.0
+                return Rounds(here.estimate, here.cost, ended._replace(raised=raised), sums)
         raise AssertionError("the last round returns")
 
     def _onward(self, before: Estimate, here: _Round, way: ndarray) -> tuple[Estimate, _Round]:

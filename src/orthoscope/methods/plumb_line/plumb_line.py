@@ -109,19 +109,26 @@ def lens_of_edges(edges: Sequence[Edge], image_size: tuple[int, int], *, lens: s
     _check_enough(len(edges), "long enough to show how they are bent")
     value = division_of_edges(edges, image_size)
     used = _belonging(bend_of_edges(edges, image_size, value))
+    formula, straight, bent = _best(edges, used, image_size, formulas)
     for _ in range(CHOICES):
-        _check_enough(int(used.sum()), "that one lens makes straight")
-        chosen = [edge for edge, one in zip(edges, used, strict=True) if one]
-        fits = [(formula, _fitted(chosen, image_size, formula)) for formula in formulas]
-        formula, straight = min(reversed(fits), key=lambda fit: _score(*fit, len(chosen)))
-        formulas = (formula,)
-        bent = _bend(edges, straight.camera)
         before, used = used, _belonging(bent)
         if (used == before).all():
             break
+        formula, straight, bent = _best(edges, used, image_size, (formula,))
     rms = float(np.sqrt((bent[used] ** 2).mean()))
     said = straight.assumptions or (() if formula.centre else (CENTRE_HELD,))
     return PlumbLine(straight.camera, tuple(edges), used, rms, said)
+
+
+def _best(
+    edges: Sequence[Edge], used: ndarray, image_size: tuple[int, int], formulas: Sequence[LineFormula]
+) -> tuple[LineFormula, StraightLens, Float[ndarray, " e"]]:
+    """The formula that the used edges speak for, its lens, and how far from straight it leaves every edge."""
+    _check_enough(int(used.sum()), "that one lens makes straight")
+    chosen = [edge for edge, one in zip(edges, used, strict=True) if one]
+    fits = [(formula, _fitted(chosen, image_size, formula)) for formula in formulas]
+    formula, straight = min(reversed(fits), key=lambda fit: _score(*fit, len(chosen)))
+    return formula, straight, _bend(edges, straight.camera)
 
 
 def _fitted(edges: Sequence[Edge], image_size: tuple[int, int], formula: LineFormula) -> StraightLens:

@@ -19,6 +19,7 @@ from orthoscope.fitting.pinhole import fit_pinhole
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import fit_centred_lens
 from orthoscope.methods.mldc.pairs import pairs_of
+from orthoscope.methods.mldc.repeated import in_gauge
 from orthoscope.solve.least_squares import shared_covariance
 from orthoscope.targets.detections import Detections, View
 from orthoscope.version import __version__
@@ -61,7 +62,7 @@ def calibration_of_corrected(
         centre=(float(centre[0]), float(centre[1])),
     )
     return Calibration(
-        camera=fit.unknowns,
+        camera=in_gauge(fit.unknowns, narrowing.free),
         camera_from_target=bases.observations.poses_in_order(pinhole.unknowns.poses),
         detections=used,
         method=method,

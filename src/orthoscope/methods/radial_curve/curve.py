@@ -6,17 +6,12 @@ So the ratio of both,
 
     d = r (h_3 X) / |(h_1, h_2) X|,
 
-is linear in the third row h_3 of the view's homography, three unknowns a view; and d is one function of r
-for all
-views. No formula is needed: corners that lie at about the same radius, of whichever view, must have about
-the same d.
-R. Hartley and S. B. Kang (PAMI 29(8), 2007) sort all corners by radius and let d differ as little as
-possible from
-one to the next, a linear problem. Corners have noise, so here d is to be a straight line in r^2 within each
-group of
-neighbours. Errors of d are those of pixels over r: rows are weighted by r. Together with h_3 the curve has
-a scale,
-which K takes up; d is 1 on average.
+is linear in the third row h_3 of the view's homography, three unknowns a view; and d is one function of r for
+all views. No formula is needed: corners that lie at about the same radius, of whichever view, must have about
+the same d. R. Hartley and S. B. Kang (PAMI 29(8), 2007) sort all corners by radius and let d differ as little
+as possible from one to the next, a linear problem. Corners have noise, so here d is to be a straight line in
+r^2 within each group of neighbours. Errors of d are those of pixels over r: rows are weighted by r. Together
+with h_3 the curve has a scale, which K takes up; d is 1 on average.
 """
 
 from __future__ import annotations
@@ -32,8 +27,7 @@ from orthoscope.methods.radial_curve.radial_lines import GridView, radial_view
 __all__ = ["RadialCurve", "curve_of_views"]
 
 # A group has as many neighbours as this times the views, so that it holds corners of most of them; at least
-# so many,
-# and the corners make at least so many groups.
+# so many, and the corners make at least so many groups.
 PER_VIEW, LEAST_GROUP, LEAST_GROUPS = 3, 16, 6
 
 
@@ -118,7 +112,7 @@ def _off_line(rows: Float[ndarray, "n k"], radius: Float[ndarray, " n"]) -> Floa
 
 def _least(deviations: Float[ndarray, "n k"], scale: Float[ndarray, " k"]) -> Float[ndarray, " k"]:
     """The h with the least deviations whose scale @ h is 1."""
-    R = np.linalg.qr(deviations, mode="r")
+    R: ndarray = np.linalg.qr(deviations).R
     towards = np.linalg.lstsq(R.T, scale, rcond=None)[0]
     h = np.linalg.lstsq(R, towards, rcond=None)[0]
     return h / (scale @ h)

@@ -6,15 +6,11 @@ H says
     x (h_3 X) - (1 + l r^2) (h_1 X) = 0,    y (h_3 X) - (1 + l r^2) (h_2 X) = 0
 
 for each corner: (D_1 + l D_2) h = 0, linear in h for a known l. D_1'(D_1 + l D_2) h = 0 is an eigenvalue
-problem of
-nine unknowns: of its real l the one is taken under which the equations are met best, in each view by
-itself; the
-median over the views is the lens. The centre is taken at the image's. It is a start and no more: noise
-biases it, and
-`fccm` with this lens refines it.
+problem of nine unknowns: of its real l the one is taken under which the equations are met best, in each view
+by itself; the median over the views is the lens. The centre is taken at the image's. It is a start and no
+more: noise biases it, and `fccm` with this lens refines it.
 A. Fitzgibbon, Simultaneous linear estimation of multiple view geometry and lens distortion, CVPR 2001, for
-two views
-of a plane; here one of both is the target itself, which has no lens.
+two views of a plane; here one of both is the target itself, which has no lens.
 """
 
 from __future__ import annotations
@@ -43,13 +39,13 @@ def fitzgibbon(detections: Detections, *, lens: str = "auto", skew: bool = False
     Args:
         detections: of a flat target, eight corners a view or more.
         lens: the formula that the corrected corners are written as, a name of LENSES or with the
-            coefficients to
-            free; `auto` is the division model itself.
+            coefficients to free; `auto` is the division model itself.
         skew: whether K has one.
     Raises:
         CalibrationError: the views cannot tell the coefficient or the pin-hole.
         InputError: a setting is none.
     """
+    lens = "division" if lens == "auto" else lens
     used = with_usable_views(detections)
     middle, unit = 0.5 * (np.array(used.image_size) - 1.0), 0.5 * float(np.hypot(*used.image_size))
     value = division_of_grids(grid_views(used), used.image_size)
@@ -62,7 +58,7 @@ def fitzgibbon(detections: Detections, *, lens: str = "auto", skew: bool = False
         used,
         straightened,
         middle,
-        lens="division" if lens == "auto" else lens,
+        lens=lens,
         method="fitzgibbon",
         settings={"lens": lens, "skew": skew},
         said=(CENTRE_TAKEN,),

@@ -6,8 +6,7 @@
 
 R. Hartley and S. B. Kang, Parameter-free radial distortion correction with center of distortion estimation,
 PAMI 29(8), 2007. All is linear but for the last pixels of the centre, and nothing is fitted jointly: lens
-first,
-then pin-hole.
+first, then pin-hole.
 """
 
 from __future__ import annotations
@@ -38,6 +37,7 @@ def hartley_kang(detections: Detections, *, lens: str = "pfet", skew: bool = Fal
         CalibrationError: the views cannot tell centre, curve or pin-hole.
         InputError: a setting is none.
     """
+    lens = "pfet" if lens == "auto" else lens
     used = with_usable_views(detections)
     views = grid_views(used)
     curve = curve_of_views(views, centre_of_distortion(views, used.image_size))

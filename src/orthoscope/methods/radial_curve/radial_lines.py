@@ -3,16 +3,11 @@
 Every corner lies on the line from the centre that its place on the target tells, however far out.
 
 With h_1, h_2 the first rows of a view's homography about the centre e, X = (X, Y, 1) a place on the target
-and p its
-pixel, (p - e) is parallel to (h_1 X, h_2 X): the radial alignment of R. Tsai (1987), and the radial
-fundamental
-matrix F = [e]x H, p' F X = 0, of R. Hartley and S. B. Kang (PAMI 29(8), 2007). F comes from eight corners
-or more
-of a view, linearly, and e is what all views' F leave out. That start is then made as good as the corners
-are: the
-distances of the corners from their radial lines, pixels, are least at e, with h_1 and h_2 of each view the
-best for
-that e.
+and p its pixel, (p - e) is parallel to (h_1 X, h_2 X): the radial alignment of R. Tsai (1987), and the radial
+fundamental matrix F = [e]x H, p' F X = 0, of R. Hartley and S. B. Kang (PAMI 29(8), 2007). F comes from eight
+corners or more of a view, linearly, and e is what all views' F leave out. That start is then made as good as
+the corners are: the distances of the corners from their radial lines, pixels, are least at e, with h_1 and
+h_2 of each view the best for that e.
 """
 
 from __future__ import annotations
@@ -30,11 +25,11 @@ __all__ = ["GridView", "RadialView", "centre_of_distortion", "grid_views", "radi
 # A view needs so many corners: its radial fundamental matrix has eight unknowns.
 FEWEST_CORNERS = 8
 # The centre is moved so often at most; a move below this, pixels, is none.
-MOVES, SETTLED_PX = 30, 1e-5
+MOVES, SETTLED_PX = 12, 1e-4
 # Slopes by the centre are differences over so much, pixels.
 NUDGE_PX = 0.2
 # The rows of a homography are fitted so often, each time with the distances of the last.
-WEIGHINGS = 3
+WEIGHINGS = 2
 # A centre this much of the diagonal beyond the frame is none.
 OUTSIDE = 0.25
 

@@ -1,14 +1,22 @@
 /* What was tried. */
 function choice() {
   const rows = panels.choice.candidates,
-    top = Math.max(...rows.map(r => r.heldOut + (r.error || 0))) * 1.05;
+    top = Math.max(...rows.map(r => r.heldOut + (r.error || 0))) * 1.05,
+    ruler = document.createElement("canvas").getContext("2d");
+  /* names stand to the left, whole where half of the figure holds them, else on two lines */
+  ruler.font = `600 12px ${css("--sans")}`;
+  const widest = texts => Math.max(...texts.map(text => ruler.measureText(text).width));
+  const parts = r => (narrow ? r.name.split(", ") : [r.name]);
+  const room = (document.querySelector("#choice .stage").clientWidth || 400) * 0.5,
+    narrow = widest(rows.map(r => r.name)) > room,
+    left = Math.ceil(widest(rows.flatMap(parts))) + 18;
   new Plot("choice", {
     zooms: false,
     labels: ["held-out rms (px per point)", ""],
     gridX: true,
-    margin: { l: 190, r: 16, t: 8, b: 42 },
+    margin: { l: left, r: 16, t: 8, b: 42 },
     range: () => ({ x: [0, top], y: [-0.6, rows.length - 0.4] }),
-    height: () => 26 * rows.length + 10,
+    height: () => (narrow ? 40 : 26) * rows.length + 10,
     axes() {
       const g = this.ctx,
         { x, y, w, h } = this.box;
@@ -21,13 +29,14 @@ function choice() {
         g.fillText(short(v), this.X(v), y + h + 6);
       }
       g.textBaseline = "bottom";
-      g.fillText(this.labels[0], x + w / 2, this.tall - 4);
+      const half = g.measureText(this.labels[0]).width / 2;
+      g.fillText(this.labels[0], Math.min(x + w / 2, this.width - half - 2), this.tall - 4);
       g.textAlign = "right";
       g.textBaseline = "middle";
       rows.forEach((r, i) => {
         g.fillStyle = css(r.loses === 0 ? "--ink" : "--soft");
         g.font = `${r.loses === 0 ? "600 " : ""}12px ${css("--sans")}`;
-        g.fillText(r.name, x - 8, this.Y(i));
+        parts(r).forEach((part, k, all) => g.fillText(part, x - 8, this.Y(i) + 15 * (k - (all.length - 1) / 2)));
       });
       g.font = `12px ${css("--sans")}`;
     },
