@@ -238,6 +238,7 @@ def _refined(
         )
         off = _off(fine, places)
     fine, off = _on_smooth_grid(grey, fine, places, off, arms[row, column])
+    off = _without_strays(fine, places, off)
     good = np.zeros_like(seen)
     good[row, column] = ~off & (seen[row, column] | fine.believed)
     if not good.all() and (~fine.believed[good[row, column]]).mean() > MOST_DOUBTFUL_SHARE:
@@ -274,6 +275,24 @@ def _on_smooth_grid(
     moved = np.hypot(*(again.pixels - foreseen).T)
     off[on[away]] = ((moved > limit) | ~again.believed)[away]
     return Refined(pixels, believed, fine.explained), off
+
+
+def _without_strays(
+    fine: Refined, places: Float[ndarray, "m 2"], off: Bool[ndarray, " m"]
+) -> Bool[ndarray, " m"]:
+    """Which corners are off once the lines are laid through those that are not, the worst first."""
+    off = off.copy()
+    for _ in range(len(off)):
+        on = np.flatnonzero(~off)
+        if len(on) < FEWEST_PART_CORNERS:
+            break
+        some = Refined(fine.pixels[on], fine.believed[on], fine.explained[on])
+        strays = _off(some, places[on])
+        if not strays.any():
+            break
+        stray = grid_shape(some.pixels, places[on]).stray
+        off[on[np.where(strays, stray, 0.0).argmax()]] = True
+    return off
 
 
 def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:

@@ -28,6 +28,9 @@ TIMES_NOISE = 3.2
 MOST_PX = 0.6
 # In a poor picture corners are off beyond this share of a step, where that is more pixels, whatever is usual.
 MOST_STEP_SHARE = 0.03
+# In a good picture corners that are not doubtful are off beyond this share of a step only: how a lens or a
+# board bends the last of them the others cannot foresee.
+SURE_STEP_SHARE = 0.15
 # The residual of a doubtful corner counts so many times.
 DOUBTFUL_TIMES = 2.0
 # At most this share of the corners is taken out.
@@ -52,7 +55,7 @@ def off_smooth_grid(
         pixels: the corners.
         places: column and row of each in the lattice.
         step: from a corner to the next, pixels.
-        doubtful: which are off sooner, by half of that; in a good picture only these can be.
+        doubtful: which are off sooner, by half of that.
         poor: whether the picture's noise, not lens or board, makes the residuals.
     """
     none = np.zeros(len(pixels), dtype=bool), pixels.copy(), np.inf
@@ -71,10 +74,11 @@ def off_smooth_grid(
         usual = float(np.median(residual[~off]))
         limit = max((TIMES_NOISE if poor else TIMES_USUAL) * usual, LEAST_PX, LEAST_STEP_SHARE * step)
         limit = min(limit, max(MOST_PX, MOST_STEP_SHARE * step)) if poor else limit
-        counted = np.where(off, 0.0, residual * np.where(doubtful, DOUBTFUL_TIMES, float(poor)))
-        if counted.max() <= limit:
+        surely = limit if poor else max(limit, SURE_STEP_SHARE * step)
+        excess = np.where(off, 0.0, residual / np.where(doubtful, limit / DOUBTFUL_TIMES, surely))
+        if excess.max() <= 1.0:
             break
-        off[counted.argmax()] = True
+        off[excess.argmax()] = True
     return off, foreseen, limit
 
 
