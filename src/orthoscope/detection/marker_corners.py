@@ -138,7 +138,8 @@ def _crossed(
     before = [np.roll(part, 1, axis=0) for part in (start, along, outward, curves)]
     s, t = np.ones(4), np.zeros(4)
     for _ in range(NEWTON_STEPS):
-        (p, dp), (q, dq) = _on_sides(*before, s), _on_sides(start, along, outward, curves, t)
+        p, dp = _on_sides(before[0], before[1], before[2], before[3], s)
+        q, dq = _on_sides(start, along, outward, curves, t)
         area = cross(dp, dq)
         if (np.abs(area) < 1e-9).any():
             return None

@@ -45,7 +45,7 @@ def _heic(content: bytes) -> ndarray:
 
 
 def _raw(content: bytes) -> ndarray:
-    import rawpy
+    import rawpy  # pyright: ignore[reportMissingImports]  no wheel for every Python
 
     with rawpy.imread(io.BytesIO(content)) as raw:
         picture = raw.postprocess(user_flip=0, output_bps=16, no_auto_bright=True, gamma=(1, 1))

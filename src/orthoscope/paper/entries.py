@@ -154,4 +154,5 @@ def own_entry(text: str) -> PaperEntry:
         ) from error
     if not callable(function):
         raise InputError(f"--with {text!r} is {function!r}; expected a function that takes detections.")
-    return PaperEntry(name if equals else attribute, function, {})
+    method: Any = function  # what it returns is seen when it has been called
+    return PaperEntry(name if equals else attribute, method, {})

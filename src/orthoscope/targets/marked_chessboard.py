@@ -99,12 +99,13 @@ class MarkedChessboard(Board):
         counts, square = parse_counts(cls, given[0]), parse_length(given[1])
         if len(given) == 4:
             return cls(*counts, square, (), given[2].strip(), parse_length(given[3]), first)
-        discs = []
+        discs: list[Square] = []
         if len(given) == 3:
             found = re.fullmatch(DISCS + r"(\d+\.\d+(\+\d+\.\d+)*)", given[2].strip())
             if not found:
                 raise cls.not_understood(":".join([cls.kind, *fields]))
-            discs = [tuple(map(int, square.split("."))) for square in found[1].split("+")]
+            squares = (square.split(".") for square in found[1].split("+"))
+            discs = [(int(column), int(row)) for column, row in squares]
         return cls(*counts, square, tuple(discs))
 
     @property

@@ -66,7 +66,7 @@ def _layout(places: Int[ndarray, "n 2"]) -> tuple[int, int, str] | None:
 
 def _inverses(axes: Float[ndarray, "n 2 2"]) -> Float[ndarray, "n 2 2"]:
     """NaN for discs without an outline."""
-    whole = np.isfinite(axes).all((1, 2))
+    whole = np.asarray(np.isfinite(axes).all((1, 2)))
     return np.where(
         whole[:, None, None], np.linalg.inv(np.where(whole[:, None, None], axes, np.eye(2))), np.nan
     )
