@@ -128,8 +128,9 @@ def _in_photograph(
 
 def _is_whole(grid: Grid | None, board: Chessboard | MarkedChessboard) -> bool:
     """Whether a grid is a whole board of these counts."""
-    whole = grid is not None and grid.seen.size == board.columns * board.rows
-    return whole and bool(placements(grid, board.columns, board.rows))
+    if grid is None or grid.seen.size != board.columns * board.rows:
+        return False
+    return bool(placements(grid, board.columns, board.rows))
 
 
 def find_chessboard(grey: ndarray, columns: int, rows: int) -> Float[ndarray, "m 2"] | None:
