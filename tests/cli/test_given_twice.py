@@ -51,3 +51,22 @@ def test_a_film_is_calibrated_from_and_straightened_in_one_command(run, photos, 
         v.image.startswith("walk.avi@")
         for v in load_calibration(tmp_path / "out/calibration.json").detections.views
     )
+
+
+def test_a_free_lens_is_no_formula_that_another_method_fits(run, corners, tmp_path):
+    told = run("calibrate", corners, "--method", "fccm", "--lens", "free", "-o", tmp_path / "camera")
+    assert told.code == 2
+    assert "only the method decoupled fits it" in told.err
+
+
+def test_a_folder_of_films_is_straightened(run, scene, tmp_path):
+    export(scene.camera, tmp_path / "camera.yaml", "opencv")
+    (tmp_path / "films").mkdir()
+    film = cv2.VideoWriter(str(tmp_path / "films/a.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 5.0, (640, 480))
+    for level in (50, 100, 150):
+        film.write(np.full((480, 640, 3), level, np.uint8))
+    film.release()
+    told = run("undistort", tmp_path / "camera.yaml", tmp_path / "films", "-o", tmp_path / "straight")
+    assert told.code == 0, told.err
+    assert "a.avi, 3 frames, and " in told.out
+    assert told.out.rstrip().endswith("camera.json, its camera")

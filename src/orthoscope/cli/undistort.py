@@ -21,8 +21,8 @@ Examples:
   $ orthoscope undistort fisheye.yaml photos/ -o round/ --projection equidistant --size 1200x1200
 
 \b
-CAMERA is ours or any tool's (`orthoscope tools`). PHOTOS are files, folders and globs of photographs; and
-video files (mp4, m4v, mov, mkv, avi), each named by itself. Photographs keep their depth, channels, EXIF,
+CAMERA is ours or any tool's (`orthoscope tools`). PHOTOS are files, folders and globs of photographs and films
+(mp4, m4v, mov, mkv, avi). Photographs keep their depth, channels, EXIF,
 profile and file type; films their sound and time stamps where PyAV is installed
 (pip install 'orthoscope[video]').
 """
@@ -84,15 +84,14 @@ def undistort(
     from orthoscope.files.whole_files import check_folder, check_not_onto
     from orthoscope.formats.load import load_camera
     from orthoscope.models.camera import Camera
-    from orthoscope.straight.film import is_video
+    from orthoscope.straight.film import CODECS, is_video
     from orthoscope.straight.outputs import replace_outputs
     from orthoscope.straight.views import share_kept, straight_camera
 
     loaded = load_camera(camera)
     view = straight_camera(loaded, keep=keep, size=size, fov=fov, scale=scale, projection=projection)
-    films = list(dict.fromkeys(Path(path) for path in photos if is_video(path)))
-    pictures = [path for path in photos if not is_video(path)]
-    paths = photographs(pictures) if pictures or not films else []
+    given = photographs(photos, also=tuple(CODECS))
+    films, paths = [path for path in given if is_video(path)], [path for path in given if not is_video(path)]
     check_folder(out)
     check_not_onto([out / path.name for path in (*films, *paths)], [*films, *paths])
     frames = straighten_films(films, loaded, out, view=view, jobs=jobs)

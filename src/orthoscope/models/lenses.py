@@ -52,6 +52,11 @@ def parse_lens(text: str) -> tuple[type[Formula], tuple[str, ...]]:
         InputError: a lens or a coefficient that is not there.
     """
     name, _, listed = text.strip().partition(":")
+    if name == FREE:
+        raise InputError(
+            f"lens {FREE!r} is no formula; only the method decoupled fits it. Name a formula, such as brown,"
+            " or leave --method out."
+        )
     if name not in LENSES:
         raise InputError(
             f"lens {name!r} is not known; expected one of {', '.join(LENSES)}, as in --lens brown or --lens"
