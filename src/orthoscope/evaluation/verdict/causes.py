@@ -30,7 +30,7 @@ NEGLIGIBLE_DIFFERENCE_PX = 0.05
 # A free lens may miss up to this share of the corners' noise.
 STIFF_SHARE = 0.5
 # What a formula misses, where it is a smaller share of the camera's error, limits nothing.
-PART_SHARE = 0.25
+PART_SHARE = 0.15
 # Chance makes hardly so large a share of the corners wild.
 WILD_SHARE = 0.005
 # With corners in less than this share of the frame's cells, it is corners that are missing.

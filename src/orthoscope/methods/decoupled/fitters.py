@@ -66,7 +66,9 @@ class Compared:
         self._fitted: dict[Model, StepOneFit] = {}
 
     def step_one(self, model: Model) -> StepOneFit:
-        """Started from a richer one, on the same base where there is one, and ended early."""
+        """Started from a richer one on the same base, and ended early. The first of a base starts from nothing:
+        bases are compared by it, and what another base found is not neutral between them.
+        """
         near = self._nearest(model)
         fit = _fit(self.flat(model.base), model, near)
         self._fitted[model] = fit
@@ -76,11 +78,11 @@ class Compared:
 
     def _nearest(self, model: Model) -> StepOneFit | None:
         richer = [
-            (other.base == model.base, fit)
+            fit
             for other, fit in self._fitted.items()
-            if SHAPES.index(other.shape) >= SHAPES.index(model.shape)
+            if other.base == model.base and SHAPES.index(other.shape) >= SHAPES.index(model.shape)
         ]
-        return max(richer, key=lambda pair: pair[0])[1] if richer else None
+        return richer[0] if richer else None
 
 
 class Kept:
