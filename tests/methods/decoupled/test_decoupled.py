@@ -308,7 +308,7 @@ def test_views_that_cannot_tell_the_camera_are_refused_as_by_fccm():
         ({"lens": "soap"}, "lens 'soap' is not known"),
         ({"lens": "brown:k9"}, "has no coefficient 'k9'"),
         ({"base": "soap"}, "lens 'soap' is not known"),
-        ({"base": "free"}, "lens 'free' is not known"),
+        ({"base": "free"}, "lens 'free' is no formula"),
         ({"first_lens": "windows"}, "first_lens is 'windows'; expected 'free'"),
         ({"lens": "free", "first_lens": "formula"}, "expected one of the two"),
         ({"formulas": ("brown", "soap")}, "lens 'soap' is not known"),
