@@ -66,8 +66,10 @@ class Compared:
         self._fitted: dict[Model, StepOneFit] = {}
 
     def step_one(self, model: Model) -> StepOneFit:
-        """Started from a richer one on the same base, and ended early. The first of a base starts from nothing:
-        bases are compared by it, and what another base found is not neutral between them.
+        """Started from a richer one on the same base, and ended early.
+
+        The first of a base starts from nothing: bases are compared by it, and what another base found is not
+        neutral between them.
         """
         near = self._nearest(model)
         fit = _fit(self.flat(model.base), model, near)
