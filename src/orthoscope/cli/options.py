@@ -33,6 +33,7 @@ __all__ = [
     "photos",
     "shape",
     "skew",
+    "straight_folder",
     "target",
     "tool_settings",
     "topic",
@@ -264,6 +265,14 @@ keep: Decorator = click.option(
     default="all",
     show_default=True,
     help="all: every photographed pixel, with black borders; valid: only places that were photographed.",
+)
+straight_folder: Decorator = click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("straight"),
+    show_default=True,
+    help="Folder to write.",
 )
 camera_file: Decorator = click.argument("camera", metavar="CAMERA")
 as_json: Decorator = click.option(

@@ -35,14 +35,7 @@ Exit: 0 done, 1 too few edges agree on a lens, 2 the command is wrong.
     metavar="NAME",
     help="A formula, or with the coefficients to find, brown:k1,k2; auto takes division or brown:k1,k2.",
 )
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("straight"),
-    show_default=True,
-    help="Folder to write.",
-)
+@options.straight_folder
 @options.keep
 @options.jobs
 @options.as_json

@@ -31,14 +31,7 @@ profile and file type; films their sound and time stamps where PyAV is installed
 @click.command(epilog=EXAMPLE)
 @options.camera_file
 @options.photos
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("straight"),
-    show_default=True,
-    help="Folder to write.",
-)
+@options.straight_folder
 @options.keep
 @click.option("--size", type=options.SIZE, help="Of the straight pictures; by default the camera's.")
 @click.option("--fov", type=float, help="Degrees that a straight picture shows across; instead of --keep.")

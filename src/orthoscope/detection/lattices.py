@@ -22,8 +22,6 @@ __all__ = ["CornerLattice", "lattices"]
 NEIGHBOUR_CANDIDATES = 16
 # The edge is off the direction to the neighbour, and off the neighbour's edge, by less than this, radians.
 WIDEST_TURN = np.deg2rad(22.0)
-# The second step in one direction is at most so many times the first, and the other way round.
-MOST_STEP_RATIO = 2.5
 # A lattice worth telling of has at least this many corners.
 FEWEST_LATTICE_CORNERS = 4
 

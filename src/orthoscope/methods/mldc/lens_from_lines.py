@@ -121,7 +121,7 @@ def lens_of_lines(
     options: Options,
     centre: bool = True,
 ) -> StraightLens:
-    """The same for lines of any kind.
+    """The lens, about a centre of its own or a given one, that makes lines of any kind straightest.
 
     Args:
         problem_of: the straightness of the lines over these parameters of the lens's own camera.
