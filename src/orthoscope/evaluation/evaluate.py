@@ -37,7 +37,7 @@ from orthoscope.geometry.arrays import Bool, Float, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import check_settings
-from orthoscope.methods.decoupled.fits import fits_of
+from orthoscope.methods.decoupled.fits import fits_of, richest_of_all
 from orthoscope.models.camera import Camera
 from orthoscope.models.image_size import check_image_size
 from orthoscope.models.target_shape import TargetShape
@@ -207,19 +207,26 @@ def _findings(
     calibration: Calibration, fits: Fits, views: tuple[ViewError, ...], misfits: Misfit
 ) -> Findings:
     reference = reference_fit(calibration, fits)
-    differ, groups = _agreement(reference, calibration.detections)
+    differ, groups = _agreement(reference, calibration)
     return Findings(calibration, views, misfits, reference, differ, groups)
 
 
-def _agreement(reference: ReferenceFit | None, detections: Detections) -> tuple[Disagreement, Groups | None]:
-    """Whether the photographs agree on one camera, and if not, which of them belong together."""
+def _agreement(
+    reference: ReferenceFit | None, calibration: Calibration
+) -> tuple[Disagreement, Groups | None]:
+    """Whether the photographs agree on one camera, and if not, which of them belong together; where some of
+    them do not agree, all are asked.
+    """
     if reference is None:
         return AGREED, None
-    found = disagreement(reference.known, detections)
+    known, detections = reference.known, calibration.detections
+    found = disagreement(known, reference.detections)
+    if found.certain and reference.detections is not detections and (all_ := richest_of_all(calibration)):
+        known = all_.known
+        found = disagreement(known, detections)
     if not found.certain:
         return found, None
-    whole = leave_one_out(reference.known)
-    return found, two_groups(reference.known, found, whole, detections, base=reference.base)
+    return found, two_groups(known, found, leave_one_out(known), detections, base=reference.base)
 
 
 def _trained_nce(calibration: Calibration) -> float:

@@ -18,6 +18,7 @@ from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.leave_one_out import LeaveOneOut
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.targets.detections import Detections
 
 __all__ = ["ReferenceFit", "reference_fit"]
 
@@ -32,17 +33,21 @@ class ReferenceFit:
     """The richest fit and what it says.
 
     Attributes:
+        detections: that it was made from, all or some that stand for many.
         known: it, linearised.
         left_out: each view left out of it.
         base: the formula under its free lens.
+        of_all: a fit of all views, linearised: the calibration's own model, or this one.
         error: how far off the calibration's own camera is.
         own_left_out: (m,) squared error of each view, px^2, by the calibration's own model without it.
         own_squares: (m,) the same with it, as the calibration is.
     """
 
+    detections: Detections
     known: Linearised
     left_out: LeaveOneOut
     base: str
+    of_all: Linearised
     error: CameraError
     own_left_out: Float[ndarray, " m"]
     own_squares: Float[ndarray, " m"]
@@ -56,21 +61,31 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
     """
     if fits.richest is None or (fits.own is None and calibration.method in ONE_FIT):
         return None
-    base, known, left_out, of_richest = fits.richest
-    scatter = fits.own.scatter if fits.own else of_richest
-    richest = None if scatter is of_richest else of_richest
+    richest, own = fits.richest, fits.own
+    scatter = own.scatter if own else richest.scatter
     pixels = np.concatenate([view.pixels for view in calibration.detections.views])
     some = picked(pixels)
     seen, distance = pixels[some], _distances(calibration)[some]
-    error = predicted_error(scatter, seen, distance=distance, richest=richest)
+    error = predicted_error(
+        scatter, seen, distance=distance, richest=richest.scatter if own else None, poorer=richest.poorer
+    )
     apart = rms_difference(calibration.camera, scatter.camera, seen)
     if apart > AS_GOOD_SHARE * error.seen_px:
         # Not the minimum of a fit whose scatter is known: what is apart is its bias.
         near_px, far_px = (float(np.hypot(px, apart)) for px in (error.near_seen_px, error.seen_px))
         error = replace(error, seen_px=far_px, near_seen_px=near_px, bias_px=apart)
-    without = (fits.own.left_out**2).sum(1) if fits.own else left_out.squares
+    without = (own.left_out**2).sum(1) if own else richest.left_out.squares
     within = np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
-    return ReferenceFit(known, left_out, base, error, without, within)
+    return ReferenceFit(
+        detections=richest.detections,
+        known=richest.known,
+        left_out=richest.left_out,
+        base=richest.base,
+        of_all=own.known if own and richest.detections is not calibration.detections else richest.known,
+        error=error,
+        own_left_out=without,
+        own_squares=within,
+    )
 
 
 def _distances(calibration: Calibration) -> Float[ndarray, " n"]:
