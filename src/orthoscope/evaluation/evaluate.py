@@ -16,7 +16,7 @@ import numpy as np
 
 from orthoscope.evaluation.camera_error import CameraError
 from orthoscope.evaluation.coverage import share_covered
-from orthoscope.evaluation.disagreement import AGREED, Disagreement, disagreement
+from orthoscope.evaluation.disagreement import AGREED, Disagreement
 from orthoscope.evaluation.groups import Groups, two_groups
 from orthoscope.evaluation.metrics import nce_of
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
@@ -211,19 +211,15 @@ def _findings(
     calibration: Calibration, fits: Fits, views: tuple[ViewError, ...], misfits: Misfit
 ) -> Findings:
     reference = reference_fit(calibration, fits)
-    differ, groups = _agreement(reference, calibration.detections)
-    return Findings(calibration, views, misfits, reference, differ, groups)
+    return Findings(calibration, views, misfits, reference, _groups(reference, calibration.detections))
 
 
-def _agreement(reference: ReferenceFit | None, detections: Detections) -> tuple[Disagreement, Groups | None]:
-    """Whether the photographs agree on one camera, and if not, which of them belong together."""
-    if reference is None:
-        return AGREED, None
-    found = disagreement(reference.known, detections)
-    if not found.certain:
-        return found, None
+def _groups(reference: ReferenceFit | None, detections: Detections) -> Groups | None:
+    """Which photographs belong together, where they do not agree on one camera."""
+    if reference is None or not reference.disagreement.certain:
+        return None
     whole = leave_one_out(reference.known)
-    return found, two_groups(reference.known, found, whole, detections, base=reference.base)
+    return two_groups(reference.known, reference.disagreement, whole, detections, base=reference.base)
 
 
 def _trained_nce(calibration: Calibration) -> float:

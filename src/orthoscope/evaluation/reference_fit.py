@@ -8,21 +8,21 @@ of them out does, and, beside the calibration's own fit, how far off its camera 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from orthoscope.evaluation.camera_error import CameraError, picked, predicted_error, rms_difference
+from orthoscope.evaluation.camera_error import CameraError, picked, predicted_error
+from orthoscope.evaluation.disagreement import Disagreement, disagreement
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.leave_one_out import LeaveOneOut
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.near_copies import near_copies
 from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["ReferenceFit", "reference_fit"]
 
-# A camera that is nearer to a fit of which all is known than this share of the error is that fit's.
-AS_GOOD_SHARE = 0.2
 # Methods whose own fit leaves views out: where it cannot, nothing is known of their camera.
 ONE_FIT = ("decoupled", "fccm")
 
@@ -35,6 +35,7 @@ class ReferenceFit:
         known: it, linearised.
         left_out: each view left out of it.
         base: the formula under its free lens.
+        disagreement: whether the photographs agree on one camera.
         error: how far off the calibration's own camera is.
         own_left_out: (m,) squared error of each view, px^2, by the calibration's own model without it.
         own_squares: (m,) the same with it, as the calibration is.
@@ -43,6 +44,7 @@ class ReferenceFit:
     known: Linearised
     left_out: LeaveOneOut
     base: str
+    disagreement: Disagreement
     error: CameraError
     own_left_out: Float[ndarray, " m"]
     own_squares: Float[ndarray, " m"]
@@ -62,15 +64,21 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
     pixels = np.concatenate([view.pixels for view in calibration.detections.views])
     some = picked(pixels)
     seen, distance = pixels[some], _distances(calibration)[some]
-    error = predicted_error(scatter, seen, distance=distance, richest=richest)
-    apart = rms_difference(calibration.camera, scatter.camera, seen)
-    if apart > AS_GOOD_SHARE * error.seen_px:
-        # Not the minimum of a fit whose scatter is known: what is apart is its bias.
-        near_px, far_px = (float(np.hypot(px, apart)) for px in (error.near_seen_px, error.seen_px))
-        error = replace(error, seen_px=far_px, near_seen_px=near_px, bias_px=apart)
+    differ, photographs = disagreement(known, calibration.detections), near_copies(calibration.detections)
+    error = predicted_error(
+        scatter,
+        seen,
+        distance=distance,
+        richest=richest,
+        judged=calibration.camera,
+        corners=pixels,
+        copies=len(photographs) / len(np.unique(photographs)),
+        # A shutter that reads row by row shears the image of one and the same camera.
+        differ_px=0.0 if differ.kind == "shutter" else differ.by_px,
+    )
     without = (fits.own.left_out**2).sum(1) if fits.own else left_out.squares
     within = np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
-    return ReferenceFit(known, left_out, base, error, without, within)
+    return ReferenceFit(known, left_out, base, differ, error, without, within)
 
 
 def _distances(calibration: Calibration) -> Float[ndarray, " n"]:

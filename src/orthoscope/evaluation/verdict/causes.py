@@ -33,8 +33,6 @@ STIFF_SHARE = 0.5
 PART_SHARE = 0.15
 # Chance makes hardly so large a share of the corners wild.
 WILD_SHARE = 0.005
-# With corners in less than this share of the frame's cells, it is corners that are missing.
-SPARSE_SHARE = 0.75
 # A sentence lists so many images.
 NAMED_IMAGES = 3
 # A principal point that is known no better than this share of the image's width is open.
@@ -110,7 +108,7 @@ def _photographs(s: Situation) -> str:
 
 def _open(s: Situation) -> bool:
     """Whether the camera is not known well enough, and not for lack of corners in some part of the frame."""
-    return s.error_px > FINE_PX or (s.held < WIDE_SHARE and s.covered >= SPARSE_SHARE)
+    return s.error_px > FINE_PX or (s.share < WIDE_SHARE and s.covered >= WIDE_SHARE)
 
 
 def _as_far_as_known(s: Situation) -> Grade:
@@ -201,7 +199,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "region",
-        lambda s: s.held < WIDE_SHARE,
+        lambda s: s.share < WIDE_SHARE,
         lambda s: Grade.REGION,
         lambda s: f"too few corners were seen {s.place}",
     ),

@@ -41,7 +41,7 @@ GRADES: tuple[_Row, ...] = (
         Grade.GOOD,
         f"off by {FINE_PX:g} px at most where corners were seen: {100 * WIDE_SHARE:.0f} % of the frame or"
         " more",
-        lambda s: s.error_px <= FINE_PX and s.held >= WIDE_SHARE,
+        lambda s: s.error_px <= FINE_PX and s.share >= WIDE_SHARE,
     ),
     _Row(
         Grade.REGION,

@@ -77,7 +77,7 @@ def _far(grade: Grade, s: Situation) -> str:
         return f"{HEADS[grade]}: nothing says how far off it is."
     if grade in (Grade.GOOD, Grade.REGION):
         seen = f"off by about {rough_pixels(s.error_px)} px where corners were seen"
-        return f"{HEADS[grade]}: {seen}, and by less than {FINE_PX:g} px over {_share(s.held)} of the frame."
+        return f"{HEADS[grade]}: {seen}, and by less than {FINE_PX:g} px over {_share(s.share)} of the frame."
     if s.near_px <= NEARER_SHARE * s.error_px:
         near = f"off by about {rough_pixels(s.near_px)} px at the distances where the target was"
         return f"{HEADS[grade]}: {near}, by {rough_pixels(s.error_px)} px far away."
