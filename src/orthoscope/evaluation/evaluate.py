@@ -17,10 +17,10 @@ import numpy as np
 from orthoscope.evaluation.camera_error import CameraError
 from orthoscope.evaluation.coverage import share_covered
 from orthoscope.evaluation.disagreement import AGREED, Disagreement
-from orthoscope.evaluation.groups import Groups, two_groups
+from orthoscope.evaluation.groups import Groups
 from orthoscope.evaluation.metrics import nce_of
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
-from orthoscope.evaluation.reference_fit import ReferenceFit, reference_fit
+from orthoscope.evaluation.reference_fit import reference_fit
 from orthoscope.evaluation.suspects import ViewError
 from orthoscope.evaluation.unseen_views import in_folds, in_turn
 from orthoscope.evaluation.verdict.facts import Findings, situation_of
@@ -30,7 +30,6 @@ from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.held_out import USUAL_FOLDS
-from orthoscope.fitting.leave_one_out import leave_one_out
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
@@ -211,15 +210,7 @@ def _findings(
     calibration: Calibration, fits: Fits, views: tuple[ViewError, ...], misfits: Misfit
 ) -> Findings:
     reference = reference_fit(calibration, fits)
-    return Findings(calibration, views, misfits, reference, _groups(reference, calibration.detections))
-
-
-def _groups(reference: ReferenceFit | None, detections: Detections) -> Groups | None:
-    """Which photographs belong together, where they do not agree on one camera."""
-    if reference is None or not reference.disagreement.certain:
-        return None
-    whole = leave_one_out(reference.known)
-    return two_groups(reference.known, reference.disagreement, whole, detections, base=reference.base)
+    return Findings(calibration, views, misfits, reference)
 
 
 def _trained_nce(calibration: Calibration) -> float:

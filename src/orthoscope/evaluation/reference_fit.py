@@ -13,13 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from orthoscope.evaluation.camera_error import CameraError, picked, predicted_error
-from orthoscope.evaluation.disagreement import Disagreement, disagreement
+from orthoscope.evaluation.disagreement import Disagreement, disagreement, with_spread
+from orthoscope.evaluation.groups import Groups, two_groups
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.fits import Fits
-from orthoscope.fitting.leave_one_out import LeaveOneOut
+from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.near_copies import near_copies
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.targets.detections import Detections
 
 __all__ = ["ReferenceFit", "reference_fit"]
 
@@ -36,6 +38,7 @@ class ReferenceFit:
         left_out: each view left out of it.
         base: the formula under its free lens.
         disagreement: whether the photographs agree on one camera.
+        groups: of photographs of two cameras; None where there is one.
         error: how far off the calibration's own camera is.
         own_left_out: (m,) squared error of each view, px^2, by the calibration's own model without it.
         own_squares: (m,) the same with it, as the calibration is.
@@ -45,6 +48,7 @@ class ReferenceFit:
     left_out: LeaveOneOut
     base: str
     disagreement: Disagreement
+    groups: Groups | None
     error: CameraError
     own_left_out: Float[ndarray, " m"]
     own_squares: Float[ndarray, " m"]
@@ -64,7 +68,8 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
     pixels = np.concatenate([view.pixels for view in calibration.detections.views])
     some = picked(pixels)
     seen, distance = pixels[some], _distances(calibration)[some]
-    differ, photographs = disagreement(known, calibration.detections), near_copies(calibration.detections)
+    differ, groups = _agreement(known, calibration.detections, base)
+    photographs = near_copies(calibration.detections)
     error = predicted_error(
         scatter,
         seen,
@@ -73,12 +78,20 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
         judged=calibration.camera,
         corners=pixels,
         copies=len(photographs) / len(np.unique(photographs)),
-        # A shutter that reads row by row shears the image of one and the same camera.
-        differ_px=0.0 if differ.kind == "shutter" else differ.by_px,
+        differ_px=differ.by_px,
     )
     without = (fits.own.left_out**2).sum(1) if fits.own else left_out.squares
     within = np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
-    return ReferenceFit(known, left_out, base, differ, error, without, within)
+    return ReferenceFit(known, left_out, base, differ, groups, error, without, within)
+
+
+def _agreement(known: Linearised, detections: Detections, base: str) -> tuple[Disagreement, Groups | None]:
+    """Whether the photographs agree on one camera, and if not, which of them belong together."""
+    found = disagreement(known, detections)
+    if not found.certain:
+        return found, None
+    groups = two_groups(known, found, leave_one_out(known), detections, base=base)
+    return (with_spread(found, known, detections) if groups else found), groups
 
 
 def _distances(calibration: Calibration) -> Float[ndarray, " n"]:

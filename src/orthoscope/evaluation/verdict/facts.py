@@ -35,12 +35,16 @@ class Findings(NamedTuple):
     views: tuple[ViewError, ...]
     misfit: Misfit
     reference: ReferenceFit | None
-    groups: Groups | None
 
     @property
     def disagreement(self) -> Disagreement:
         """Whether the photographs agree on one camera."""
         return self.reference.disagreement if self.reference else AGREED
+
+    @property
+    def groups(self) -> Groups | None:
+        """Of photographs of two cameras; None where there is one."""
+        return self.reference.groups if self.reference else None
 
 
 def situation_of(found: Findings) -> Situation:

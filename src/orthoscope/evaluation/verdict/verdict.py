@@ -75,7 +75,7 @@ def far_on_others(rms_px: float, image_size: tuple[int, int]) -> str:
 def _far(grade: Grade, s: Situation) -> str:
     if isnan(s.error_px):
         return f"{HEADS[grade]}: nothing says how far off it is."
-    if grade in (Grade.GOOD, Grade.REGION):
+    if grade in (Grade.GOOD, Grade.REGION) and s.error_px <= FINE_PX:
         seen = f"off by about {rough_pixels(s.error_px)} px where corners were seen"
         return f"{HEADS[grade]}: {seen}, and by less than {FINE_PX:g} px over {_share(s.share)} of the frame."
     if s.near_px <= NEARER_SHARE * s.error_px:
