@@ -127,6 +127,7 @@ class _Variances:
         self,
         scatter: Scatter,
         rich: Scatter | None,
+        poorer: Scatter,
         rays: Float[ndarray, "n 3"],
         fitted: int,
         distance: float,
@@ -147,7 +148,9 @@ class _Variances:
             if not scatter.stretch.any():  # a target that is taken for flat hides a stretch as well
                 hidden = _spread(of_rich, rich.stretch)
                 self.alike, self.views = self.alike + hidden, self.views + hidden
-            apart = difference_of_images(rich.camera, scatter.camera, rays, rays[:fitted], distance=distance)
+            apart = difference_of_images(rich.camera, poorer.camera, rays, rays[:fitted], distance=distance)
+            if poorer is not scatter:
+                by_view = _settled(poorer, rays, fitted, distance) @ poorer.left_out.T
             both = by_view - of_rich @ rich.left_out.T
             by_chance = np.nansum(both**2, axis=(1, 2))
             self.apart, self.by_chance = np.nan_to_num((apart**2).sum(1)), by_chance
@@ -180,6 +183,7 @@ def predicted_error(
     *,
     distance: float | Float[ndarray, " s"],
     richest: Scatter | None = None,
+    poorer: Scatter | None = None,
     judged: Camera | None = None,
     corners: Float[ndarray, "n 2"] | None = None,
     copies: float = 1.0,
@@ -191,7 +195,9 @@ def predicted_error(
         scatter: of the camera.
         seen: pixels where corners were detected (`seen_places`).
         distance: of the corner that was seen there, metres; one for all where that will do.
-        richest: scatter of the richest model of the same photographs; None where it is this one.
+        richest: scatter of the richest model of the same photographs, or of some of them; None where it is
+            this one.
+        poorer: scatter of the camera's own model of the photographs of the richest, where these are some.
         judged: the camera, where the scatter is that of another fit: how far it is from that one's counts as
             bias.
         corners: all that were detected, for the region to lie between; by default those of `seen`.
@@ -212,8 +218,10 @@ def predicted_error(
     part_seen, part_frame = slice(len(seen)), slice(len(seen), len(seen) + len(cells))
     lengths = np.ones(len(places))
     lengths[part_seen] = each / typical
-    far = _Variances(scatter, richest, places, len(seen), np.inf, given)
-    near = _Variances(scatter, richest, lengths[:, None] * places, len(seen), typical, given)
+    far = _Variances(scatter, richest, poorer or scatter, places, len(seen), np.inf, given)
+    near = _Variances(
+        scatter, richest, poorer or scatter, lengths[:, None] * places, len(seen), typical, given
+    )
     seen_px, model_px, alike_px, views_px, bias_px = far.over(part_seen)
     along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
     corners = seen if corners is None else corners

@@ -16,11 +16,12 @@ from orthoscope.evaluation.camera_error import CameraError, picked, predicted_er
 from orthoscope.evaluation.disagreement import Disagreement, disagreement, with_spread
 from orthoscope.evaluation.groups import Groups, two_groups
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.fits import Fits
+from orthoscope.fitting.fits import Fits, RichestFit
 from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.near_copies import near_copies
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.methods.decoupled.fits import richest_of_all
 from orthoscope.targets.detections import Detections
 
 __all__ = ["ReferenceFit", "reference_fit"]
@@ -34,21 +35,25 @@ class ReferenceFit:
     """The richest fit and what it says.
 
     Attributes:
+        detections: that it was made from, all or some that stand for many.
         known: it, linearised.
         left_out: each view left out of it.
         base: the formula under its free lens.
         disagreement: whether the photographs agree on one camera.
         groups: of photographs of two cameras; None where there is one.
+        of_all: a fit of all views, linearised: the calibration's own model, or this one.
         error: how far off the calibration's own camera is.
         own_left_out: (m,) squared error of each view, px^2, by the calibration's own model without it.
         own_squares: (m,) the same with it, as the calibration is.
     """
 
+    detections: Detections
     known: Linearised
     left_out: LeaveOneOut
     base: str
     disagreement: Disagreement
     groups: Groups | None
+    of_all: Linearised
     error: CameraError
     own_left_out: Float[ndarray, " m"]
     own_squares: Float[ndarray, " m"]
@@ -62,35 +67,52 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
     """
     if fits.richest is None or (fits.own is None and calibration.method in ONE_FIT):
         return None
-    base, known, left_out, of_richest = fits.richest
-    scatter = fits.own.scatter if fits.own else of_richest
-    richest = None if scatter is of_richest else of_richest
+    richest, own = fits.richest, fits.own
+    scatter = own.scatter if own else richest.scatter
     pixels = np.concatenate([view.pixels for view in calibration.detections.views])
     some = picked(pixels)
     seen, distance = pixels[some], _distances(calibration)[some]
-    differ, groups = _agreement(known, calibration.detections, base)
+    differ, groups = _agreement(richest, calibration)
     photographs = near_copies(calibration.detections)
     error = predicted_error(
         scatter,
         seen,
         distance=distance,
-        richest=richest,
+        richest=richest.scatter if own else None,
+        poorer=richest.poorer,
         judged=calibration.camera,
         corners=pixels,
         copies=len(photographs) / len(np.unique(photographs)),
         differ_px=differ.by_px,
     )
-    without = (fits.own.left_out**2).sum(1) if fits.own else left_out.squares
+    without = (own.left_out**2).sum(1) if own else richest.left_out.squares
     within = np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
-    return ReferenceFit(known, left_out, base, differ, groups, error, without, within)
+    return ReferenceFit(
+        detections=richest.detections,
+        known=richest.known,
+        left_out=richest.left_out,
+        base=richest.base,
+        disagreement=differ,
+        groups=groups,
+        of_all=own.known if own and richest.detections is not calibration.detections else richest.known,
+        error=error,
+        own_left_out=without,
+        own_squares=within,
+    )
 
 
-def _agreement(known: Linearised, detections: Detections, base: str) -> tuple[Disagreement, Groups | None]:
-    """Whether the photographs agree on one camera, and if not, which of them belong together."""
-    found = disagreement(known, detections)
+def _agreement(richest: RichestFit, calibration: Calibration) -> tuple[Disagreement, Groups | None]:
+    """Whether the photographs agree on one camera, and if not, which of them belong together; where some of
+    them do not agree, all are asked.
+    """
+    known, detections = richest.known, calibration.detections
+    found = disagreement(known, richest.detections)
+    if found.certain and richest.detections is not detections and (all_ := richest_of_all(calibration)):
+        known = all_.known
+        found = disagreement(known, detections)
     if not found.certain:
         return found, None
-    groups = two_groups(known, found, leave_one_out(known), detections, base=base)
+    groups = two_groups(known, found, leave_one_out(known), detections, base=richest.base)
     return (with_spread(found, known, detections) if groups else found), groups
 
 

@@ -59,7 +59,7 @@ def suspects_among(
     """Images of the photographs that do not belong, with what is wrong.
 
     Args:
-        known: the richest fit of them, where there is one.
+        known: a fit of them, linearised, where there is one.
         points: the target's corners, nominal.
     """
     errors = np.array([view.rms_px for view in views])

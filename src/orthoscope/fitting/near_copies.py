@@ -6,7 +6,7 @@ left out together (leave_one_out.py) and count as one photograph.
 
 from __future__ import annotations
 
-from itertools import product
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,13 +23,14 @@ USUAL_WIDTH = 1000.0
 FEWEST_COMMON = 4
 # So many corners tell first which views may be copies at all.
 FIRST_CORNERS = 16
-# A corner that moved by less than a cell lies in its own cell or in one of those around it.
-NEIGHBOURS = tuple(product((-1, 0, 1), repeat=2))
 
 
+@lru_cache(maxsize=4)
 def near_copies(detections: Detections) -> Int[ndarray, " m"]:
     """Which photograph each view is: the number, from 0, of the first view that it copies, counted without
     copies.
+
+    Many ask for it, of the same detections.
     """
     near = COPIED_PX * max(1.0, max(detections.image_size) / USUAL_WIDTH)
     views, corners = len(detections.views), len(detections.target.points)
@@ -40,18 +41,19 @@ def near_copies(detections: Detections) -> Int[ndarray, " m"]:
     cells = np.floor(np.nan_to_num(tables[:, some], nan=-1e9) / near).astype(np.int64)
     seen = np.isfinite(tables[:, some, 0])
     number = np.zeros(views, dtype=np.int64)
-    kept: list[int] = []
-    at: dict[tuple[int, int, int], list[int]] = {}  # kept views by where they see a few corners
+    kept = np.zeros(views, dtype=np.int64)  # the first so many: views that copy none before them
+    count = 0
     for i in range(views):
-        places = [(int(k), int(cells[i, k, 0]), int(cells[i, k, 1])) for k in np.flatnonzero(seen[i])]
-        around = ((k, x + dx, y + dy) for k, x, y in places for dx, dy in NEIGHBOURS)
-        perhaps = {n for place in around for n in at.get(place, ())} if places else range(len(kept))
-        same = [n for n in sorted(perhaps) if _is_copy(tables[kept[n]], tables[i], near)]
-        number[i] = same[0] if same else len(kept)
+        before = kept[:count]
+        # A corner that moved by less than a cell lies in its own cell or in one of those around it.
+        close = (np.abs(cells[before] - cells[i]) <= 1).all(-1) & seen[before] & seen[i]
+        perhaps = np.flatnonzero(close.any(1)) if seen[i].any() else range(count)
+        same = [n for n in perhaps if _is_copy(tables[kept[n]], tables[i], near)]
+        number[i] = same[0] if same else count
         if not same:
-            for place in places:
-                at.setdefault(place, []).append(len(kept))
-            kept.append(i)
+            kept[count] = i
+            count += 1
+    number.setflags(write=False)
     return number
 
 

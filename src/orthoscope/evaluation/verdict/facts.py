@@ -56,7 +56,7 @@ def situation_of(found: Findings) -> Situation:
     target, lens = found.misfit.target, found.misfit.lens
     images = [view.image for view in detections.views]
     known = reference.known if reference else None
-    suspects = suspects_among(found.views, known, detections.target.points)
+    suspects = suspects_among(found.views, reference.of_all if reference else None, detections.target.points)
     wild = _wild(calibration, {image for image, _ in suspects})
     told = distinct > DISTINCT_SHARE * views  # copies agree with each other whatever is true
     return Situation(

@@ -20,9 +20,9 @@ __all__ = ["GRADES", "WIDE_SHARE", "Grade", "by_error", "good_somewhere", "lower
 # A camera holds widely over this share of the frame: fifteen photographs of a board that is led all over the
 # frame have their corners in 70 % of it, since the board's own margin keeps them from its border.
 WIDE_SHARE = 0.6
-# A camera is good at the target's distances where it is off by no more there, pixels,
+# A camera that is off by no more at the target's distances, pixels, is good there.
 NEAR_FINE_PX = 0.25
-# and by no more far away.
+# One that is good there only may be off by no more far away, pixels.
 AWAY_PX = 0.75
 
 
