@@ -56,7 +56,7 @@ def test_a_good_set_gets_its_error_with_its_uncertainty_and_no_warning(good):
     assert good.verdict.cause == ""
     assert str(good.verdict) == (
         f"Good: off by about {good.error.seen_px:.2g} px where corners were seen, and by less than 0.5 px"
-        f" over {100 * good.situation.held:.0f} % of the frame."
+        f" over {100 * good.error.share:.0f} % of the frame."
     )
 
 
