@@ -200,7 +200,7 @@ shape: Decorator = click.option(
     metavar="KIND",
     help=(
         "The target's shape, for decoupled: flat (as it is said to be), smooth (stretched, bent) or free"
-        " (each corner by itself); by default what foresees best."
+        " (each corner by itself); by default what best predicts photographs left out."
     ),
 )
 base: Decorator = click.option(
@@ -216,7 +216,7 @@ fit: Decorator = click.option(
     metavar="HOW",
     help=(
         "How decoupled fits a formula that --lens or --export asks for: joint (with poses and target) or pairs"
-        " (to what the free lens found); by default what foresees best."
+        " (to what the free lens found); by default what best predicts photographs left out."
     ),
 )
 skew: Decorator = click.option("--skew", is_flag=True, help="Let the pixel axes be oblique.")

@@ -33,12 +33,13 @@ from orthoscope.fitting.held_out import USUAL_FOLDS
 from orthoscope.fitting.leave_one_out import leave_one_out
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
-from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
+from orthoscope.geometry.arrays import Bool, Float, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import check_settings
 from orthoscope.methods.decoupled.fits import fits_of, richest_of_all
 from orthoscope.models.camera import Camera
+from orthoscope.models.image_size import check_image_size
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
@@ -127,12 +128,7 @@ def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | 
         InputError: the photographs are of another size than the camera's.
         CalibrationError: no view can be used.
     """
-    if tuple(detections.image_size) != tuple(camera.image_size):
-        (width, height), (w, h) = detections.image_size, camera.image_size
-        raise InputError(
-            f"these photographs are {width}x{height}; the camera was calibrated at {w}x{h}. Hand in"
-            " photographs of that size."
-        )
+    check_image_size(camera, detections.image_size)
     used = with_usable_views(detections)
     poses = resect(camera, used, shape=shape)
     if has_outlines(used):

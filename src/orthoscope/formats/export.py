@@ -109,6 +109,7 @@ def export(
         CalibrationError: no lens of the tool sees as far from the axis.
     """
     record = record_of(tool)
+    _check_suffix(record, Path(path))
     camera = source if isinstance(source, Camera) else source.camera
     made_from = source if isinstance(source, Calibration) else None
     held = exportable(camera, tool, made_from=made_from)
@@ -130,6 +131,19 @@ def export(
     for place, content in files.items():
         write_bytes(place, content.encode() if isinstance(content, str) else content)
     return Exported(record, held, tuple(files))
+
+
+def _check_suffix(record: Format, path: Path) -> None:
+    """The suffix says which of a tool's files is meant.
+
+    Raises:
+        InputError: the tool has several and this is none of them.
+    """
+    if path.suffix and len(record.suffixes) > 1 and path.suffix.lower() not in record.suffixes:
+        raise InputError(
+            f"{path} does not say which file of {record.title} is meant; expected a name that ends in"
+            f" {' or '.join(record.suffixes)}. Name it so."
+        )
 
 
 def exportable(camera: Camera, tool: str, *, made_from: Calibration | None = None) -> Exportable:
