@@ -34,6 +34,7 @@ __all__ = [
     "shape",
     "skew",
     "straight_folder",
+    "strict",
     "target",
     "tool_settings",
     "topic",
@@ -280,6 +281,9 @@ as_json: Decorator = click.option(
 )
 calibration_file: Decorator = click.argument(
     "calibration", type=click.Path(path_type=Path), metavar="CALIBRATION.json"
+)
+strict: Decorator = click.option(
+    "--strict", is_flag=True, help='Exit with 3 where the verdict is "do not use", once all is written.'
 )
 verbose: Decorator = click.option(
     "-v", "--verbose", is_flag=True, help="Print every figure that was found, and what was left out."

@@ -16,11 +16,11 @@ import numpy as np
 
 from orthoscope.evaluation.camera_error import CameraError
 from orthoscope.evaluation.coverage import share_covered
-from orthoscope.evaluation.disagreement import AGREED, Disagreement, disagreement
-from orthoscope.evaluation.groups import Groups, two_groups
+from orthoscope.evaluation.disagreement import AGREED, Disagreement
+from orthoscope.evaluation.groups import Groups
 from orthoscope.evaluation.metrics import nce_of
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
-from orthoscope.evaluation.reference_fit import ReferenceFit, reference_fit
+from orthoscope.evaluation.reference_fit import reference_fit
 from orthoscope.evaluation.suspects import ViewError
 from orthoscope.evaluation.unseen_views import in_folds, in_turn
 from orthoscope.evaluation.verdict.facts import Findings, situation_of
@@ -30,14 +30,13 @@ from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.held_out import USUAL_FOLDS
-from orthoscope.fitting.leave_one_out import leave_one_out
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, median, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import check_settings
-from orthoscope.methods.decoupled.fits import fits_of, richest_of_all
+from orthoscope.methods.decoupled.fits import fits_of
 from orthoscope.models.camera import Camera
 from orthoscope.models.image_size import check_image_size
 from orthoscope.models.target_shape import TargetShape
@@ -207,26 +206,7 @@ def _findings(
     calibration: Calibration, fits: Fits, views: tuple[ViewError, ...], misfits: Misfit
 ) -> Findings:
     reference = reference_fit(calibration, fits)
-    differ, groups = _agreement(reference, calibration)
-    return Findings(calibration, views, misfits, reference, differ, groups)
-
-
-def _agreement(
-    reference: ReferenceFit | None, calibration: Calibration
-) -> tuple[Disagreement, Groups | None]:
-    """Whether the photographs agree on one camera, and if not, which of them belong together; where some of
-    them do not agree, all are asked.
-    """
-    if reference is None:
-        return AGREED, None
-    known, detections = reference.known, calibration.detections
-    found = disagreement(known, reference.detections)
-    if found.certain and reference.detections is not detections and (all_ := richest_of_all(calibration)):
-        known = all_.known
-        found = disagreement(known, detections)
-    if not found.certain:
-        return found, None
-    return found, two_groups(known, found, leave_one_out(known), detections, base=reference.base)
+    return Findings(calibration, views, misfits, reference)
 
 
 def _trained_nce(calibration: Calibration) -> float:

@@ -57,6 +57,16 @@ ADVICE: tuple[Advice, ...] = (
         _plain("Switch stabiliser and cropping off, and take them again."),
         lambda s: s.disagree == "centre",
     ),
+    Advice(
+        "photographs",
+        _plain("Use photographs of one lens only, as the camera wrote them."),
+        lambda s: s.disagree == "lens",
+    ),
+    Advice(
+        "photographs",
+        _plain("Fix zoom and focus, keep camera and target still, and take them again."),
+        lambda s: s.disagree == "mixed",
+    ),
     Advice("photographs", _plain("Put the camera on a stand, keep the target still, and take them again.")),
     Advice(
         "lens",
