@@ -60,6 +60,8 @@ MOST_STARTS = 3
 NEUTRAL_COEFFICIENTS: dict[type[Formula], tuple[dict[str, float], ...]] = {
     Rational: ({}, {"k1": 1.0, "k4": 1.0}),
 }
+# One lens of the angle for all, since what a lens finds out about its domain stays with it.
+EQUIDISTANT = KannalaBrandt()
 
 
 @dataclass(frozen=True)
@@ -294,9 +296,7 @@ def _plausible(K: Intrinsics, image_size: tuple[int, int], away: float = 0.0) ->
 
 def _equidistant(image_size: tuple[int, int], focal: float) -> Camera:
     width, height = image_size
-    return Camera(
-        image_size, Intrinsics(focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)), KannalaBrandt()
-    )
+    return Camera(image_size, Intrinsics(focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)), EQUIDISTANT)
 
 
 def _misfit(estimate: Estimate, observations: Observations, points: Float[ndarray, "p 3"]) -> float:
