@@ -8,6 +8,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
+# Workers and the commands that tests start then share what one of them has compiled.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: compiled release-check demo test test-all check format lint types rooms picture bench bench-peers clean
 

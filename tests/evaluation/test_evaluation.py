@@ -100,7 +100,9 @@ def test_what_is_held_out_is_held_out_by_the_calibrations_own_method_and_setting
     assert_array_equal(np.array(evaluation.held_out_residuals), np.array(expected.residuals))
 
 
-@pytest.mark.parametrize("fit", [partial(fccm, lens="brown:k1,k2"), decoupled])
+@pytest.mark.parametrize(
+    "fit", [partial(fccm, lens="brown:k1,k2"), pytest.param(decoupled, marks=pytest.mark.slow)]
+)
 def test_each_photograph_left_out_by_one_step_is_foreseen_as_by_fits_without_it(fit):
     calibration = fit(photographs_of(bent(1.0), 6, 1))
     by_step, by_fits = evaluate(calibration), evaluate(calibration, folds=6)

@@ -18,7 +18,7 @@ import numpy as np
 
 from orthoscope.detection.grid import GridShape, grid_shape, nearest_neighbour
 from orthoscope.detection.saddle import fit_saddles
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, distinct, median, ndarray
 
 __all__ = ["Refined", "refined"]
 
@@ -76,7 +76,7 @@ def refined(
         approach: whether cornerSubPix comes near first; not where it went astray before.
     """
     square = nearest_neighbour(rough, places)
-    shrink = max(1, round(float(np.median(square)) / USUAL_SQUARE))
+    shrink = max(1, round(median(square) / USUAL_SQUARE))
     first, part = _surroundings(grey, rough, square.max())
     small = _reduced(part, shrink)
     near = (rough - first + 0.5) / shrink - 0.5
@@ -121,7 +121,7 @@ def _noise(grey: ndarray) -> float:
     """The variance of a picture's noise, from what differs from pixel to pixel in its even parts."""
     rough = cv2.filter2D(grey, cv2.CV_32F, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32))
     rough = rough.ravel()[:: max(1, rough.size // NOISE_PIXELS)]
-    return float((np.median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)
+    return float((median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)
 
 
 def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
@@ -129,7 +129,7 @@ def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
     radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, places)), 2, LARGEST_REACH).astype(int)
     places = np.clip(corners, 0, np.array(grey.shape[::-1]) - 1).astype(np.float32)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-2)
-    for size in np.unique(radius):
+    for size in distinct(radius):
         which = radius == size
         some = np.ascontiguousarray(places[which]).reshape(-1, 1, 2)
         places[which] = cv2.cornerSubPix(grey, some, (int(size), int(size)), (-1, -1), criteria).reshape(

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.detection.saddle_windows import COLUMN_COUNT, Shapes, Windows
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, median, ndarray
 
 __all__ = ["Saddles", "fit_saddles"]
 
@@ -109,7 +109,7 @@ class _Fit:
         """The middle one of a few corners' blurs, for all."""
         few = self.by_size[:: max(1, len(self.by_size) // BLUR_CORNERS)]
         self.settle(few, *STAGES[0])
-        self.shapes.blur[:] = np.median(self.shapes.blur[few])
+        self.shapes.blur[:] = median(self.shapes.blur[few])
 
     def settle(self, which: ndarray, share: float, still: float) -> None:
         """Steps in a share of the window until each corner has moved by less than `still` px, or has had its

@@ -38,7 +38,7 @@ from orthoscope.evaluation.region import (
 from orthoscope.evaluation.verdict.situation import FINE_PX
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.scatter import Scatter
-from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, evenly, median, ndarray
 from orthoscope.models.camera import Camera
 
 __all__ = ["CameraError", "picked", "predicted_error", "rms_difference", "seen_places"]
@@ -135,7 +135,8 @@ class _Variances:
     ) -> None:
         # rays may have lengths of their own: places along them, in units of the distance
         slopes = _settled(scatter, rays, fitted, distance)
-        self.model, self.alike = _spread(slopes, scatter.repeated), _spread(slopes, scatter.alike)
+        self.fitted = fitted
+        self.model, self.alike = _spread(slopes[:fitted], scatter.repeated), _spread(slopes, scatter.alike)
         self.alike *= given.copies
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
         self.moved = (by_view**2).sum(1)  # (n, m)
@@ -167,14 +168,25 @@ class _Variances:
     def total(self) -> Float[ndarray, " n"]:
         return np.maximum(self.alike, self.views) + self.bias + self.off
 
-    def over(self, some: slice) -> _Parts:
-        """Root mean squares over some places; the bias is what is left of it in the mean."""
-        model, alike, views = (float(np.nanmean(part[some])) for part in (self.model, self.alike, self.views))
+    def over(self, some: slice) -> float:
+        """The root mean square of the error over some places; the bias is what is left of it in the mean."""
+        alike, views, bias = self._means(some)
+        return float(np.sqrt(max(alike, views) + bias))
+
+    @property
+    def parts(self) -> _Parts:
+        """Root mean squares over the places that the motion was fitted to."""
+        alike, views, bias = self._means(slice(self.fitted))
+        squares = [max(alike, views) + bias, float(np.nanmean(self.model)), alike, views, bias]
+        return _Parts(*np.sqrt(squares).tolist())
+
+    def _means(self, some: slice) -> tuple[float, float, float]:
+        """Of both variances and of the squared bias, over some places."""
         bias = 0.0
         if self.bias.any():
             bias = max(float(np.nanmean(self.apart[some] - self.by_chance[some])), 0.0)
         bias += float(np.mean(self.off[some]))
-        return _Parts(*np.sqrt([max(alike, views) + bias, model, alike, views, bias]).tolist())
+        return float(np.nanmean(self.alike[some])), float(np.nanmean(self.views[some])), bias
 
 
 def predicted_error(
@@ -211,27 +223,25 @@ def predicted_error(
     rays, each = camera.unproject(seen), np.broadcast_to(np.asarray(distance, dtype=float), len(seen))
     known = np.isfinite(rays[:, 0])
     seen, rays, each = seen[known], rays[known], each[known]
-    typical = float(np.median(each))
-    middle = np.median(seen, axis=0)
+    typical = median(each)
+    middle = np.array([median(along) for along in seen.T])
     ways, given = ways_from(middle, camera.image_size), _Given(copies, judged, differ_px)
     places = np.concatenate([rays, camera.unproject(cells), camera.unproject(ways.reshape(-1, 2))])
     part_seen, part_frame = slice(len(seen)), slice(len(seen), len(seen) + len(cells))
-    lengths = np.ones(len(places))
-    lengths[part_seen] = each / typical
     far = _Variances(scatter, richest, poorer or scatter, places, len(seen), np.inf, given)
-    near = _Variances(
-        scatter, richest, poorer or scatter, lengths[:, None] * places, len(seen), typical, given
-    )
-    seen_px, model_px, alike_px, views_px, bias_px = far.over(part_seen)
-    along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
+    close = places[: part_frame.stop].copy()
+    close[part_seen] *= each[:, None] / typical
+    near = _Variances(scatter, richest, poorer or scatter, close, len(seen), typical, given)
+    seen_px, model_px, alike_px, views_px, bias_px = far.parts
+    along = np.sqrt(far.total[part_frame.stop :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
     corners = seen if corners is None else corners
     region = grown(middle, ways, along, FINE_PX, seen=corners)
     imaged = _within_cells(np.isfinite(far.total[part_frame]), width, height)
     return CameraError(
         seen_px=seen_px,
-        frame_px=far.over(part_frame)[0],
-        near_seen_px=near.over(part_seen)[0],
-        near_frame_px=near.over(part_frame)[0],
+        frame_px=far.over(part_frame),
+        near_seen_px=near.over(part_seen),
+        near_frame_px=near.over(part_frame),
         model_px=model_px,
         alike_px=alike_px,
         views_px=views_px,
@@ -270,7 +280,7 @@ def seen_places(pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "s 2"]:
 def picked(pixels: Float[ndarray, "n 2"]) -> Int[ndarray, " s"]:
     """Which of the detected corners `seen_places` picks."""
     order = np.lexsort(pixels.T)
-    return order[np.unique(np.linspace(0, len(order) - 1, PLACE_COUNT).round().astype(int))]
+    return order[evenly(len(order), PLACE_COUNT)]
 
 
 def _settled(

@@ -32,7 +32,7 @@ from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.held_out import USUAL_FOLDS
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, median, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import check_settings
@@ -174,7 +174,7 @@ def evaluate(
     return Evaluation(
         calibration=calibration,
         rms_px=rms(np.concatenate(residuals)),
-        median_px=float(np.median(sizes)),
+        median_px=median(sizes),
         largest_px=float(sizes.max()),
         held_out_rms_px=unseen.rms_px,
         held_out_error_px=unseen.error_px,

@@ -82,7 +82,7 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
         poorer=richest.poorer,
         judged=calibration.camera,
         corners=pixels,
-        copies=len(photographs) / len(np.unique(photographs)),
+        copies=len(photographs) / (int(photographs.max()) + 1),
         differ_px=differ.by_px,
     )
     without = (own.left_out**2).sum(1) if own else richest.left_out.squares

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Int, ndarray
+from orthoscope.geometry.arrays import Int, evenly, median, ndarray
 from orthoscope.targets.detections import Detections
 
 __all__ = ["near_copies", "summed_over"]
@@ -37,7 +37,7 @@ def near_copies(detections: Detections) -> Int[ndarray, " m"]:
     tables = np.full((views, corners, 2), np.nan)
     for table, view in zip(tables, detections.views, strict=True):
         table[view.ids] = view.pixels
-    some = np.unique(np.linspace(0, corners - 1, FIRST_CORNERS).round().astype(int))
+    some = evenly(corners, FIRST_CORNERS)
     cells = np.floor(np.nan_to_num(tables[:, some], nan=-1e9) / near).astype(np.int64)
     seen = np.isfinite(tables[:, some, 0])
     number = np.zeros(views, dtype=np.int64)
@@ -60,7 +60,7 @@ def near_copies(detections: Detections) -> Int[ndarray, " m"]:
 def _is_copy(one: ndarray, other: ndarray, near: float) -> bool:
     apart = np.hypot(*(one - other).T)
     common = np.isfinite(apart)
-    return bool(common.sum() >= FEWEST_COMMON and np.median(apart[common]) < near)
+    return bool(common.sum() >= FEWEST_COMMON and median(apart[common]) < near)
 
 
 def summed_over(groups: Int[ndarray, " m"], values: ndarray) -> ndarray:

@@ -17,7 +17,7 @@ import numpy as np
 
 from orthoscope.files.whole_files import write_bytes
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.lens_fit import FOCAL, about_principal_point, fit_pairs
+from orthoscope.fitting.lens_fit import FOCAL, Pairs, about_principal_point, fit_pairs
 from orthoscope.formats.record import Contents, Format, Holding, share_beyond, shifted
 from orthoscope.formats.table import tool as record_of
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
@@ -26,6 +26,7 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.difference import frame_grid
 from orthoscope.models.lenses import lens_name, parse_lens
 from orthoscope.simulation.scene import Scene
+from orthoscope.solve.least_squares import Options
 
 __all__ = ["LIMIT_PX", "Exportable", "Exported", "export", "exportable"]
 
@@ -33,6 +34,8 @@ __all__ = ["LIMIT_PX", "Exportable", "Exported", "export", "exportable"]
 LIMIT_PX = 1.0
 # Corners that are as good as all of them to fit a formula to.
 ENOUGH_CORNERS = 4000
+# Which lens is nearest is plain before the last digits, which only that one needs.
+ROUGH_OPTIONS = Options(tolerance=1e-5)
 
 
 class Exportable(NamedTuple):
@@ -183,25 +186,28 @@ def _nearest(camera: Camera, rays: Float[ndarray, "n 3"], record: Format) -> tup
         focal = (*focal, "skew")
     fy = frame.fy if record.two_focals else frame.fx
     plain = replace(camera, intrinsics=Intrinsics(frame.fx, fy, frame.cx, frame.cy, skew), lens_frame=None)
-    near: list[tuple[float, Camera, Holding]] = []
+    near: list[tuple[float, Camera, Pairs]] = []
     for text in record.lenses:
         kind, free = parse_lens(text)
         starts = [replace(plain, lens=kind(**start)) for start in kind.starts]
         try:
-            other = fit_pairs(about_principal_point(rays, wanted, (*focal, *free)), starts).unknowns
+            problem = about_principal_point(rays, wanted, (*focal, *free))
+            other = fit_pairs(problem, starts, options=ROUGH_OPTIONS).unknowns
         except CalibrationError:
             continue
-        other = other.with_unit_scale()
-        holding = record.holding(other.lens)
-        if holding and np.isfinite(apart := ((other.project(rays) - wanted) ** 2).sum()):
-            near.append((float(apart), other, holding))
+        apart = ((other.project(rays) - wanted) ** 2).sum()
+        if np.isfinite(apart) and record.holding(other.with_unit_scale().lens):
+            near.append((float(apart), other, problem))
     if not near:
         raise CalibrationError(
             f"none of {', '.join(record.lenses)} sees as far from the axis as this camera does. Use a tool"
             f" with a"
             " lens of the angle."
         )
-    _, other, holding = min(near, key=lambda entry: entry[0])
+    _, other, problem = min(near, key=lambda entry: entry[0])
+    other = fit_pairs(problem, [other]).unknowns.with_unit_scale()
+    holding = record.holding(other.lens)
+    assert holding is not None, "it was held before the last steps"
     return other, holding
 
 

@@ -96,6 +96,7 @@ def test_the_best_is_first_and_loses_nothing(comparison):
     assert all(standing.loses_px > 0 for standing in comparison.standings[1:])
 
 
+@pytest.mark.slow
 def test_each_error_is_that_of_the_judge_for_the_same_folds(comparison):
     best = comparison.standings[0]
     unseen = held_out(TEN, partial(fccm, lens="brown"))

@@ -16,6 +16,7 @@ from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_a
 from orthoscope.evaluation.verdict.situation import Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.near_copies import near_copies
+from orthoscope.geometry.arrays import median
 from orthoscope.solve.least_squares import Status
 
 __all__ = ["Findings", "corners_beyond", "situation_of"]
@@ -51,7 +52,7 @@ def situation_of(found: Findings) -> Situation:
     """The facts."""
     calibration, reference, disagreement = found.calibration, found.reference, found.disagreement
     detections, settings = calibration.detections, calibration.settings
-    views, distinct = len(detections.views), len(np.unique(near_copies(detections)))
+    views, distinct = len(detections.views), int(near_copies(detections).max(initial=-1)) + 1
     error = reference.error if reference else None
     target, lens = found.misfit.target, found.misfit.lens
     images = [view.image for view in detections.views]
@@ -117,7 +118,7 @@ def _wild(calibration: Calibration, suspects: set[str]) -> dict[str, int]:
     photographs that do not belong left aside.
     """
     sizes = [np.hypot(*e.T) for e in calibration.residuals()]
-    limit = max(WILD_FACTOR * float(np.median(np.concatenate(sizes))), WILD_PX)
+    limit = max(WILD_FACTOR * median(np.concatenate(sizes)), WILD_PX)
     views = calibration.detections.views
     return {
         view.image: int((size > limit).sum())
