@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.grid import GridShape, grid_shape, nearest_neighbour
-from orthoscope.detection.saddle import fit_saddles
+from orthoscope.detection.saddle import Saddles, fit_saddles
 from orthoscope.geometry.arrays import Bool, Float, ndarray
 
 __all__ = ["Refined", "refined"]
@@ -40,6 +40,13 @@ NOISE_LEFT_SHARE = 0.41
 SADDLE_MEAN_SQUARE = 0.6
 # A fit that ends farther from its start than this share of a square is not believed.
 FARTHEST_SHARE = 0.35
+# Of a sure corner the standard deviation is less than this, pixels: it is within a pixel then, as good as
+# always.
+WIDEST_SPREAD = 0.22
+# The edges of a sure corner are off the lattice's lines by less than this, radians.
+WIDEST_TURN = 0.4
+# A sure corner has more than this share of the usual contrast.
+LEAST_CONTRAST_SHARE = 0.35
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
 LEAST_SADDLE_SHARE = 0.85
 
@@ -49,13 +56,19 @@ NOISE_PIXELS = 10_000
 
 
 class Refined(NamedTuple):
-    """pixels: (m,2) of the corners.  believed: (m,) whether a saddle was fitted; else cornerSubPix had the
-    last word.  explained: (m,) share of its window's variance that the saddle explains.
+    """Corners, (m,) of each.
+
+    Attributes:
+        pixels: (m,2).
+        believed: whether a saddle was fitted; else cornerSubPix had the last word.
+        explained: share of its window's variance that the saddle explains.
+        sure: whether the saddle says to well within a pixel where the corner is, and is like the others'.
     """
 
     pixels: Float[ndarray, "m 2"]
     believed: Bool[ndarray, " m"]
     explained: Float[ndarray, " m"]
+    sure: Bool[ndarray, " m"]
 
 
 def refined(
@@ -95,7 +108,18 @@ def refined(
     least = LEAST_SADDLE_SHARE * signal / np.maximum(signal + _noise(small) * NOISE_LEFT_SHARE, 1e-9)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
-    return Refined(pixels, believed, saddles.explained)
+    sure = believed & (saddles.spread * shrink < WIDEST_SPREAD) & _are_alike(saddles, shape)
+    return Refined(pixels, believed, saddles.explained, sure)
+
+
+def _are_alike(saddles: Saddles, shape: GridShape) -> Bool[ndarray, " m"]:
+    """Which saddles have edges along the lattice's lines, and about as much contrast as most."""
+    lines = np.stack([shape.along, shape.down], axis=1)
+    turn = saddles.angles - np.arctan2(lines[..., 1], lines[..., 0])
+    off = np.abs((turn + 0.5 * np.pi) % np.pi - 0.5 * np.pi).max(1)
+    contrast = np.abs(saddles.contrast)
+    usual = float(np.median(contrast))
+    return (off < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * usual)
 
 
 def _surroundings(
