@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.grid import GridShape, grid_shape, nearest_neighbour
+from orthoscope.detection.noise import noise_variance
 from orthoscope.detection.saddle import Saddles, fit_saddles
 from orthoscope.geometry.arrays import Bool, Float, ndarray
 
@@ -49,10 +50,6 @@ WIDEST_TURN = 0.4
 LEAST_CONTRAST_SHARE = 0.35
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
 LEAST_SADDLE_SHARE = 0.85
-
-
-# So many pixels, evenly picked, tell the noise.
-NOISE_PIXELS = 10_000
 
 
 class Refined(NamedTuple):
@@ -105,7 +102,7 @@ def refined(
     )
     allowed = np.maximum(FARTHEST_SHARE * nearest_neighbour(near, places), 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
-    least = LEAST_SADDLE_SHARE * signal / np.maximum(signal + _noise(small) * NOISE_LEFT_SHARE, 1e-9)
+    least = LEAST_SADDLE_SHARE * signal / np.maximum(signal + noise_variance(small) * NOISE_LEFT_SHARE, 1e-9)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     sure = believed & (saddles.spread * shrink < WIDEST_SPREAD) & _are_alike(saddles, shape)
@@ -139,13 +136,6 @@ def _reduced(grey: ndarray, shrink: int) -> ndarray:
     return cv2.resize(
         grey[: height * shrink, : width * shrink], (width, height), interpolation=cv2.INTER_AREA
     )
-
-
-def _noise(grey: ndarray) -> float:
-    """The variance of a picture's noise, from what differs from pixel to pixel in its even parts."""
-    rough = cv2.filter2D(grey, cv2.CV_32F, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32))
-    rough = rough.ravel()[:: max(1, rough.size // NOISE_PIXELS)]
-    return float((np.median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)
 
 
 def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
