@@ -220,7 +220,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=400)
     parser.add_argument("--first", type=int, default=0, help="the number of the first")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--verbose", action="store_true", help="a line for each photograph with false corners")
+    parser.add_argument(
+        "--verbose", action="store_true", help="a line for each photograph with false corners"
+    )
     given = parser.parse_args()
     cv2.setNumThreads(1)
     tallies: dict[str, _Tally] = {}

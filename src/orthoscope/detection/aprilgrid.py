@@ -74,7 +74,9 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
     return Sight(ids[order], pixels[order], remark)
 
 
-def _fitted(grey: ndarray, ids: ndarray, corners: ndarray, board: AprilGrid) -> tuple[ndarray, ndarray, ndarray]:
+def _fitted(
+    grey: ndarray, ids: ndarray, corners: ndarray, board: AprilGrid
+) -> tuple[ndarray, ndarray, ndarray]:
     """The corners at which a saddle was fitted, on their neighbours' lines, and which of them are sure."""
     places = board.places()[ids] * [1.0, -1.0]  # rows are counted upwards
     fine = refined(grey, corners, places, arm=BORDER_SQUARES / TAG_SQUARES / board.spacing)

@@ -168,7 +168,6 @@ class _Fit:
         shapes.relief[here] = np.clip(contrast / np.maximum(level + solution[:, 6], 1.0), -1.0, 1.0)
         return np.abs(step[:, :2]).max(1)
 
-
     def _damping(self, here: ndarray, sums: Float[ndarray, "n 10 10"]) -> Float[ndarray, "n 9"]:
         """What is added to the diagonal of the sums: of the light, what noise makes of a window is not
         believed to be light beyond `USUAL_LIGHT`.
