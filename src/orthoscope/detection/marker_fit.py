@@ -1,8 +1,9 @@
 """Corners of single markers to a few hundredths of a pixel: the whole marker, whose squares are known, is
 drawn as the picture has it, and moved and bent until it is the picture.
 
-A marker's corner is no saddle, and blur rounds it; but all edges inside the marker say where it lies, too. Let
-P(u) be the marker's drawing and H the homography of its four corners as they are known so far. The picture is
+A marker's corner is no saddle, and blur rounds it; but all edges inside the marker say where it lies, too.
+Let P(u) be the marker's drawing and H the homography of its four corners as they are known so far. The
+picture is
 
     I(x) = c + g.x + b M(x),      M(x) = blurred P(H^-1(x + d(x))),    d a polynomial of third order
 
@@ -45,8 +46,8 @@ MOST_STEPS, STILL_PX = 8, 0.05
 FARTHEST_PX = 0.3
 # Less contrast than this, grey levels, is none.
 LEAST_CONTRAST = 1.0
-# Black has at most so many times the contrast, by haze or glare.
-MOST_DARK = 2.0
+# Black, of a negative white, has at most so many times the contrast, by haze or glare.
+MOST_DARK = 3.0
 # A marker with fewer pixels tells nothing.
 FEWEST_PIXELS = 60
 # Of a marker of the picture's own width a lens bends the sides by about this share of it: by terms of second
@@ -62,13 +63,13 @@ USUAL_LIGHT = 0.1
 MOST_UNEXPLAINED = 0.03
 # Within so many squares from a good corner what is left has a variance, but for noise, of at most this share
 # of the square of the contrast.
-LOCAL_MODULES, MOST_LOCALLY_UNEXPLAINED = 2.5, 0.003
+LOCAL_MODULES, MOST_LOCALLY_UNEXPLAINED = 1.5, 0.0015
 # Of a good corner the standard deviation is less than this, pixels.
 WIDEST_SPREAD = 0.22
 
 
 class FittedMarkers(NamedTuple):
-    """corners: (n,4,2) pixels.  good: (n,4) whether the picture says to well within a pixel where they are."""
+    """corners: (n,4,2) pixels.  good: (n,4) whether the picture says to well within a pixel where each is."""
 
     corners: Float[ndarray, "n 4 2"]
     good: Bool[ndarray, "n 4"]
@@ -165,7 +166,7 @@ class _Fit:
         it.
         """
         signal = 0.25 * self.contrast**2
-        if self.contrast < 0 or self.unexplained > MOST_UNEXPLAINED + noise / (signal + noise):
+        if self.unexplained > MOST_UNEXPLAINED + noise / (signal + noise):
             return np.zeros(4, dtype=bool)
         near = LOCAL_MODULES * self._side / self._squares
         away = np.linalg.norm(self._places - (self.corners - self._low)[:, :, None], axis=1)
@@ -185,8 +186,8 @@ class _Fit:
         normal = (columns @ columns.T).astype(float)
         # what the bend was before counts, too: as a whole it is held to nothing, by as much as there is noise
         held = 1e-7 * np.diag(normal) + 1e-9
-        held[: 2 * count] += self.noise / np.maximum(self._usual_bends * self.contrast, 1e-6) ** 2
-        held[-4:-2] += self.noise / max(USUAL_LIGHT * self.contrast, 1e-6) ** 2
+        held[: 2 * count] += self.noise / np.maximum(self._usual_bends * abs(self.contrast), 1e-6) ** 2
+        held[-4:-2] += self.noise / max(USUAL_LIGHT * abs(self.contrast), 1e-6) ** 2
         wanted = np.zeros(len(held))
         wanted[: 2 * count] = np.where(
             np.isfinite(self._usual_bends), -self.contrast * self._moved.ravel(), 0.0
@@ -199,7 +200,7 @@ class _Fit:
         self._left = self._values - solution.astype(np.float32) @ columns
         self.noise = float(self._left @ self._left) / max(len(self._left) - len(solution), 1)
         self.unexplained = float(self._left.var() / max(self._values.var(), 1e-9))
-        self._dark = float(np.clip(solution[-1] / self.contrast, 0.0, MOST_DARK))
+        self._dark = float(np.clip(solution[-1] / self.contrast, -MOST_DARK, MOST_DARK))
         limit = 0.5 * self._side / self._squares
         steps = solution[: 2 * count].reshape(2, count) / self.contrast
         self._moved = self._moved + np.clip(steps, -limit, limit)

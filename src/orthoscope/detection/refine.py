@@ -48,6 +48,8 @@ WIDEST_SPREAD = 0.22
 WIDEST_TURN = 0.4
 # A sure corner has more than this share of the usual contrast.
 LEAST_CONTRAST_SHARE = 0.35
+# A mark on one side of a sure corner is farther from its edges than so many of the fitted blurs.
+CLEAR_BLURS = 2.0
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
 LEAST_SADDLE_SHARE = 0.85
 
@@ -82,7 +84,8 @@ def refined(
         grey: (h,w) uint8.
         rough: (m,2) pixels.
         places: (m,2) column and row of each in the lattice, in steps.
-        arm: how far from the edges something else than squares is printed, in steps; of all or of each.
+        arm: how far from the edges something else than squares is printed, in steps; of all, where it is on
+            opposite sides, or of each.
         approach: whether cornerSubPix comes near first; not where it went astray before.
     """
     square = nearest_neighbour(rough, places)
@@ -105,7 +108,8 @@ def refined(
     least = LEAST_SADDLE_SHARE * signal / np.maximum(signal + noise_variance(small) * NOISE_LEFT_SHARE, 1e-9)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
-    sure = believed & (saddles.spread * shrink < WIDEST_SPREAD) & _are_alike(saddles, shape)
+    sure = believed & (saddles.spread * shrink < WIDEST_SPREAD)
+    sure &= _are_alike(saddles, grid_shape(saddles.places, places)) & _are_clear(saddles, near, places, arm)
     return Refined(pixels, believed, saddles.explained, sure)
 
 
@@ -117,6 +121,15 @@ def _are_alike(saddles: Saddles, shape: GridShape) -> Bool[ndarray, " m"]:
     contrast = np.abs(saddles.contrast)
     usual = float(np.median(contrast))
     return (off < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * usual)
+
+
+def _are_clear(
+    saddles: Saddles, near: Float[ndarray, "m 2"], places: ndarray, arm: float | Float[ndarray, " m"]
+) -> Bool[ndarray, " m"]:
+    """Which saddles have no blurred mark beside them: what is printed on one side only draws them there."""
+    if isinstance(arm, float):
+        return np.ones(len(near), dtype=bool)
+    return (arm >= 1.0) | (arm * nearest_neighbour(near, places) > CLEAR_BLURS * saddles.blur)
 
 
 def _surroundings(

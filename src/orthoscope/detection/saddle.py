@@ -63,6 +63,7 @@ class Saddles(NamedTuple):
     Attributes:
         places: (n,2) pixels.
         angles: (n,2) of the two edges, radians.
+        blur: (n,) w, pixels.
         contrast: (n,) C, grey levels.
         explained: (n,) share of the window's variance that the saddle explains.
         spread: (n,) standard deviation of a place in its worst direction, pixels, by what is not explained.
@@ -70,6 +71,7 @@ class Saddles(NamedTuple):
 
     places: Float[ndarray, "n 2"]
     angles: Float[ndarray, "n 2"]
+    blur: Float[ndarray, " n"]
     contrast: Float[ndarray, " n"]
     explained: Float[ndarray, " n"]
     spread: Float[ndarray, " n"]
@@ -99,7 +101,8 @@ def fit_saddles(
     fit.begin_with_one_blur()
     for share, still in STAGES:
         fit.settle(fit.by_size, share, still)
-    return Saddles(fit.shapes.places, fit.shapes.angles, fit.contrast, fit.explained, fit.spread())
+    shapes = fit.shapes
+    return Saddles(shapes.places, shapes.angles, shapes.blur, fit.contrast, fit.explained, fit.spread())
 
 
 class _Fit:
