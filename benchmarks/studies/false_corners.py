@@ -5,10 +5,10 @@
     python -m benchmarks.studies.false_corners --verbose                 a line for each false corner
 
 Photographs are 640x480, by a lens `brown` and a fisheye in turn; sharp, usual and poor ones (`QUALITIES`);
-tilts to 65 degrees; boards fill a quarter of the picture to all of it, one in four stands over its rim, one in
-eight has something grey over a part of it. A false corner is more than 1 px from where its id is, in the best
-of the ways in which the board looks the same; for discs, from the middle of the outline. Ids are wrong where
-most corners of a photograph are false.
+tilts to 65 degrees; boards fill a quarter of the picture to all of it, one in four stands over its rim, one
+in eight has something grey over a part of it. A false corner is more than 1 px from where its id is, in the
+best of the ways in which the board looks the same; for discs, from the middle of the outline. Ids are wrong
+where most corners of a photograph are false.
 """
 
 from __future__ import annotations

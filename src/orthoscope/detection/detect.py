@@ -184,14 +184,15 @@ def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, asi
 def _never_seen(looks: list[_Look], target: Target) -> list[Remark]:
     """A remark on each of several targets that no photograph shows."""
     count = sum(look.size is not None for look in looks)
-    return [
-        Remark(
-            member.name,
-            f"was found in none of {count} photographs; expected in some of them. "
-            f"{member.board.advice if member.board else 'See that it is whole, sharp and lit'}, or leave it out",
-        )
+    never = [
+        member
         for number, member in enumerate(target.members)
         if not any(number in look.found for look in looks)
+    ]
+    told = f"was found in none of {count} photographs; expected in some of them."
+    return [
+        Remark(member.name, f"{told} {member.board.advice if member.board else 'See that it is there'}")
+        for member in never
     ]
 
 

@@ -48,6 +48,9 @@ WIDEST_SPREAD = 0.22
 WIDEST_TURN = 0.4
 # A sure corner has more than this share of the usual contrast.
 LEAST_CONTRAST_SHARE = 0.35
+# Of a sure corner's window the saddle leaves at most so much more than of most, as a share of its variance
+# and, with that, of the share that is noise.
+MOST_UNEXPLAINED, MOST_UNEXPLAINED_NOISE = 0.03, 0.3
 # A mark on one side of a sure corner is farther from its edges than so many of the fitted blurs.
 CLEAR_BLURS = 2.0
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
@@ -105,22 +108,28 @@ def refined(
     )
     allowed = np.maximum(FARTHEST_SHARE * nearest_neighbour(near, places), 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
-    least = LEAST_SADDLE_SHARE * signal / np.maximum(signal + noise_variance(small) * NOISE_LEFT_SHARE, 1e-9)
+    noise = NOISE_LEFT_SHARE * noise_variance(small)
+    noise_share = noise / np.maximum(signal + noise, 1e-9)
+    least = LEAST_SADDLE_SHARE * (1.0 - noise_share)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     sure = believed & (saddles.spread * shrink < WIDEST_SPREAD)
-    sure &= _are_alike(saddles, grid_shape(saddles.places, places)) & _are_clear(saddles, near, places, arm)
+    sure &= _are_alike(saddles, grid_shape(saddles.places, places), noise_share)
+    sure &= _are_clear(saddles, near, places, arm)
     return Refined(pixels, believed, saddles.explained, sure)
 
 
-def _are_alike(saddles: Saddles, shape: GridShape) -> Bool[ndarray, " m"]:
-    """Which saddles have edges along the lattice's lines, and about as much contrast as most."""
+def _are_alike(saddles: Saddles, shape: GridShape, noise_share: Float[ndarray, " m"]) -> Bool[ndarray, " m"]:
+    """Which saddles have edges along the lattice's lines, about as much contrast as most, and are as true to
+    the picture as most: where something covers a part of a window, it is explained less.
+    """
     lines = np.stack([shape.along, shape.down], axis=1)
     turn = saddles.angles - np.arctan2(lines[..., 1], lines[..., 0])
     off = np.abs((turn + 0.5 * np.pi) % np.pi - 0.5 * np.pi).max(1)
     contrast = np.abs(saddles.contrast)
-    usual = float(np.median(contrast))
-    return (off < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * usual)
+    left = 1.0 - saddles.explained - noise_share
+    true = left - np.median(left) < MOST_UNEXPLAINED + MOST_UNEXPLAINED_NOISE * noise_share
+    return true & (off < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * float(np.median(contrast)))
 
 
 def _are_clear(
