@@ -122,6 +122,7 @@ def test_levels_that_cannot_be_read_are_a_wrong_command(tmp_path):
         assert text in told.output
 
 
+@pytest.mark.slow
 def test_the_example_puts_opencv_into_figure_4_in_processes(tmp_path):
     """Two processes start and compute: three seconds."""
     command = [sys.executable, str(EXAMPLE), "--quick", "--out", str(tmp_path)]

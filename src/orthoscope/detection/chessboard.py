@@ -37,7 +37,7 @@ from orthoscope.detection.refine import Refined, refined
 from orthoscope.detection.saddle_points import saddle_points
 from orthoscope.detection.sight import TWICE, Sight, Unseen
 from orthoscope.detection.smooth_grid import off_smooth_grid
-from orthoscope.geometry.arrays import Bool, Float, InputError, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, InputError, Int, median, ndarray
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.marked_chessboard import MarkedChessboard
 
@@ -55,6 +55,8 @@ SMALL_STEP = 12.0
 FEWEST_PART_CORNERS = 6
 # At least this share of the board's corners hangs together, or trying other finders is not worth while.
 ENOUGH_CORNERS_SHARE = 0.25
+# Of a second board that is wholly in the picture at least this share of the corners hangs together.
+SECOND_BOARD_SHARE = 0.5
 # More than this many times the board's corners are a tiled floor, not a board.
 TOO_MANY_RATIO = 1.5
 # Where one lattice has this many times the board's corners, whatever it is, no further copy is looked at.
@@ -112,7 +114,8 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         sight = _on_board(grey, grid, board)
         open_ |= sight is None
         if sight and len(sight.ids) == board.columns * board.rows:
-            alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in others)
+            large = (other for other in others if len(other.pixels) >= SECOND_BOARD_SHARE * len(sight.ids))
+            alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in large)
             return _sure(sight, TWICE if alike else "")
         parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: int(sight.sure.sum()), default=None)
@@ -282,8 +285,8 @@ def _on_smooth_grid(
     on = np.flatnonzero(~off)
     if not len(on):
         return fine, off
-    step = float(np.median(nearest_neighbour(fine.pixels[on], places[on])))
-    poor = float(np.median(fine.explained[on])) < LEAST_EXPLAINED or step < SMALL_STEP
+    step = median(nearest_neighbour(fine.pixels[on], places[on]))
+    poor = median(fine.explained[on]) < LEAST_EXPLAINED or step < SMALL_STEP
     away, foreseen, limit = off_smooth_grid(
         fine.pixels[on], places[on], step, doubtful=~fine.believed[on], poor=poor
     )
@@ -320,7 +323,7 @@ def _without_strays(
 def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
     """Which corners are off their neighbours' lines by more than is usual, no saddles sooner."""
     stray = grid_shape(fine.pixels, places).stray
-    usual = min(float(np.median(stray)), LARGEST_USUAL_STRAY)
+    usual = min(median(stray), LARGEST_USUAL_STRAY)
     return stray > np.where(
         fine.believed,
         max(OFF_LIMITS[0], OFF_LIMITS[1] * usual),

@@ -7,7 +7,6 @@ read, one of another size than most, one that shows the same picture as another,
 from __future__ import annotations
 
 import hashlib
-import os
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -25,6 +24,7 @@ from orthoscope.detection.together import see_members
 from orthoscope.files.images import MOST_MEGAPIXELS
 from orthoscope.files.pictures import Given, Picture, pictures
 from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.cores import at_once
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.detections import Detections, Remark, SetAside, View, view_name
 from orthoscope.targets.table import parse_target
@@ -80,7 +80,7 @@ def detect(
     given = pictures(photographs, topic=topic)
     names = [picture.name for picture in given]
     looks: list[_Look] = []
-    with nullcontext(executor) if executor else ThreadPoolExecutor(jobs or os.cpu_count()) as run:
+    with nullcontext(executor) if executor else ThreadPoolExecutor(at_once(jobs)) as run:
         asked = [_placed(picture) for picture in given]
         for look in run.map(_look, asked, [target] * len(given), [most_megapixels] * len(given)):
             looks.append(look)

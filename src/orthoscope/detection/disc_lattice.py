@@ -15,7 +15,7 @@ from collections import deque
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.circles import Circles
 
@@ -213,7 +213,7 @@ def like_the_others(
     if not len(ids):
         return np.zeros(0, dtype=bool)
     places, radii = board.neighbour_places()[ids], np.sqrt(np.abs(np.linalg.det(discs.axes)))
-    good = roughness < max(MOST_ROUGH * float(np.median(roughness)), SMOOTH_RADII)
+    good = roughness < max(MOST_ROUGH * median(roughness), SMOOTH_RADII)
     known = np.column_stack([discs.centres, np.log(radii)])
     off_place, off_size = np.zeros((2, len(ids)))
     for number in range(len(ids)):
@@ -225,8 +225,8 @@ def like_the_others(
             told, reach = weights @ known[nearest], max(1.0, float(np.linalg.norm(weights)))
             off_place[number] = np.hypot(*(told - known[number])[:2]) / radii[number] / reach
             off_size[number] = abs(told[2] - known[number, 2]) / reach
-    good &= off_place < max(MOST_OFF_PLACE, TIMES_OFF_PLACE * float(np.median(off_place)))
-    return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * float(np.median(off_size))))
+    good &= off_place < max(MOST_OFF_PLACE, TIMES_OFF_PLACE * median(off_place))
+    return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
 
 
 def _foretelling(steps: Int[ndarray, "k 2"]) -> Float[ndarray, " k"]:

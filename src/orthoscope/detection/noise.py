@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from orthoscope.geometry.arrays import ndarray
+from orthoscope.geometry.arrays import median, ndarray
 
 __all__ = ["noise_variance"]
 
@@ -21,4 +21,4 @@ def noise_variance(grey: ndarray) -> float:
     """
     rough = cv2.filter2D(grey, cv2.CV_32F, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32))
     rough = rough.ravel()[:: max(1, rough.size // NOISE_PIXELS)]
-    return float((np.median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)
+    return float((median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)

@@ -19,7 +19,7 @@ import numpy as np
 from orthoscope.detection.grid import GridShape, grid_shape, nearest_neighbour
 from orthoscope.detection.noise import noise_variance
 from orthoscope.detection.saddle import Saddles, fit_saddles
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, distinct, median, ndarray
 
 __all__ = ["Refined", "refined"]
 
@@ -92,7 +92,7 @@ def refined(
         approach: whether cornerSubPix comes near first; not where it went astray before.
     """
     square = nearest_neighbour(rough, places)
-    shrink = max(1, round(float(np.median(square)) / USUAL_SQUARE))
+    shrink = max(1, round(median(square) / USUAL_SQUARE))
     first, part = _surroundings(grey, rough, square.max())
     small = _reduced(part, shrink)
     near = (rough - first + 0.5) / shrink - 0.5
@@ -128,8 +128,8 @@ def _are_alike(saddles: Saddles, shape: GridShape, noise_share: Float[ndarray, "
     off = np.abs((turn + 0.5 * np.pi) % np.pi - 0.5 * np.pi).max(1)
     contrast = np.abs(saddles.contrast)
     left = 1.0 - saddles.explained - noise_share
-    true = left - np.median(left) < MOST_UNEXPLAINED + MOST_UNEXPLAINED_NOISE * noise_share
-    return true & (off < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * float(np.median(contrast)))
+    true = left - median(left) < MOST_UNEXPLAINED + MOST_UNEXPLAINED_NOISE * noise_share
+    return true & (off < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * median(contrast))
 
 
 def _are_clear(
@@ -165,7 +165,7 @@ def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
     radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, places)), 2, LARGEST_REACH).astype(int)
     places = np.clip(corners, 0, np.array(grey.shape[::-1]) - 1).astype(np.float32)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-2)
-    for size in np.unique(radius):
+    for size in distinct(radius):
         which = radius == size
         some = np.ascontiguousarray(places[which]).reshape(-1, 1, 2)
         places[which] = cv2.cornerSubPix(grey, some, (int(size), int(size)), (-1, -1), criteria).reshape(

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.detection.saddle_windows import COLUMN_COUNT, Shapes, Windows
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, median, ndarray
 
 __all__ = ["Saddles", "fit_saddles"]
 
@@ -126,7 +126,7 @@ class _Fit:
         """The middle one of a few corners' blurs, for all."""
         few = self.by_size[:: max(1, len(self.by_size) // BLUR_CORNERS)]
         self.settle(few, *STAGES[0])
-        self.shapes.blur[:] = np.median(self.shapes.blur[few])
+        self.shapes.blur[:] = median(self.shapes.blur[few])
 
     def settle(self, which: ndarray, share: float, still: float) -> None:
         """Steps in a share of the window until each corner has moved by less than `still` px, or has had its
@@ -186,7 +186,7 @@ class _Fit:
         damped = self.sums[:, :-1, :-1] + np.eye(COLUMN_COUNT) * self._damping(every, self.sums)[:, None]
         scale = self.noise / np.maximum(self.contrast**2, 1e-9)
         of_columns = np.linalg.inv(damped)[:, :2, :2] * scale[:, None, None]
-        blur, bends = np.maximum(self.shapes.blur, np.median(self.shapes.blur)), self.shapes.bends
+        blur, bends = np.maximum(self.shapes.blur, median(self.shapes.blur)), self.shapes.bends
         shapes = Shapes(self.shapes.places, self.shapes.angles, blur, bends, self.shapes.relief)
         units = np.broadcast_to(np.eye(5)[:2], (len(blur), 2, 5))
         turned = np.stack([_in_pixels(units[:, i], shapes)[:, :2] for i in (0, 1)], axis=2)

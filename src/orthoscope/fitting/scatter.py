@@ -29,7 +29,7 @@ import numpy as np
 
 from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of
 from orthoscope.fitting.linearised import Linearised
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, evenly, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import polynomials
 
@@ -95,7 +95,7 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
     Args:
         points: the target's corners, nominal.
     """
-    some = fit.only(_evenly(fit.views, VIEW_COUNT))
+    some = fit.only(evenly(fit.views, VIEW_COUNT))
     patterns = patterns_over_views(some, points)
     tau = likenesses(some, patterns)
     camera = np.zeros((fit.of_camera, fit.of_camera))
@@ -171,7 +171,3 @@ def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "_ _ _"]]) -> 
         by_chance = fit.noise * float((rows**2).sum() - (rows * hat_of(fit, rows)).sum())
         found.append(max(1.0, float(in_residuals) / max(by_chance, 1e-300)))
     return tuple(found)
-
-
-def _evenly(views: int, wanted: int) -> ndarray:
-    return np.unique(np.linspace(0, views - 1, wanted).round().astype(int))

@@ -13,7 +13,7 @@ from orthoscope.geometry.numbers import ABSENT, pixels
 from orthoscope.report import tables
 from orthoscope.report.data.views import suspects_of
 from orthoscope.report.headline import headline, next_steps
-from orthoscope.report.html import Html, table, tag
+from orthoscope.report.html import Html, table, tag, unbroken
 from orthoscope.report.panels import PANELS
 from orthoscope.report.pictures import Pictures
 from orthoscope.report.shape import shape_rows
@@ -61,7 +61,7 @@ def opening(evaluation: Evaluation) -> Html:
     return tag(
         "header",
         tag("p", "orthoscope · calibration report", class_="kicker"),
-        tag("h1", grade, " ", tag("span", told.sentence)),
+        tag("h1", grade, " ", tag("span", unbroken(told.sentence))),
         tag("p", told.limit, class_="limit") if told.limit else None,
         tag("p", facts, class_="facts"),
         class_=f"grade-{told.look}",
@@ -118,7 +118,7 @@ def _camera(evaluation: Evaluation) -> Html:
     return tag(
         "div",
         tag("h2", "K and lens"),
-        tag("p", tables.camera_line(evaluation.calibration), class_="camera-line"),
+        tag("p", unbroken(tables.camera_line(evaluation.calibration)), class_="camera-line"),
         tag(
             "div",
             tag("div", tabs, role="tablist", aria_label="Camera for"),

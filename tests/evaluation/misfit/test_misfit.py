@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.stats import binom, kstest
 
 from helpers.boards import (
     BOARD,
@@ -46,6 +45,8 @@ UNLUCKY = 1e-4
 
 def assert_rate(found: np.ndarray, promised: float) -> None:
     """That no more of the trials (bool) are true than a rate as promised gives."""
+    from scipy.stats import binom  # a second of its own
+
     assert found.sum() <= binom.isf(UNLUCKY, len(found), promised), f"{found.sum()} of {len(found)}"
 
 
@@ -68,6 +69,8 @@ TRUTHS: dict[str, Callable[[int], Calibration]] = {
 @pytest.mark.parametrize("perfectly", TRUTHS.values(), ids=TRUTHS)
 def test_p_values_of_perfect_boards_are_evenly_spread(perfectly):
     """The residuals of the truth are pure noise: whatever is granted, F must have its distribution."""
+    from scipy.stats import kstest  # a second of its own
+
     p = np.array([both(misfit(perfectly(seed))) for seed in range(40)])
     assert kstest(p[:, 0], "uniform").pvalue > UNLUCKY
     assert kstest(p[:, 1], "uniform").pvalue > UNLUCKY

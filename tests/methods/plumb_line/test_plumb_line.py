@@ -84,6 +84,7 @@ def test_the_division_model_is_linear_in_an_edge():
     assert_allclose(division_of_edges(edges, SIZE), -0.4 * (unit / 520.0) ** 2, rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.datasets
 def test_the_edges_of_a_board_alone_give_the_image_of_the_full_calibration(datasets):
     """Within half a pixel wherever corners were seen; the calibration has the corners, this one no target."""
