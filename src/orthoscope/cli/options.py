@@ -181,7 +181,8 @@ lens: Decorator = click.option(
     show_default=True,
     metavar="NAME",
     help=(
-        "free (a formula and a spline on top), brown, rational, kannala_brandt, division, fov, pfet, fet;"
+        "free (a formula and a spline on top), brown, rational, kannala_brandt, double_sphere, eucm, division,"
+        " fov, pfet, fet;"
         " brown:k1,k2 frees just these; auto takes what the method takes: decoupled the free lens, fccm"
         " brown, or kannala_brandt for wide views."
     ),

@@ -67,8 +67,8 @@ class CameraError:
             at its own distance, since a shift of the camera undoes less where distances differ; over the
             frame at the typical one.
         model_px, alike_px, views_px, bias_px: over the seen part, far away, what makes it up: independent
-            errors of corners with the priors' scatter; these with errors alike within a view; the jackknife
-            over views with the priors' scatter; what a poorer model misses.
+            errors of corners alone; these with errors alike within a view and the priors' scatter; the
+            jackknife over views with the priors' scatter; what a poorer model misses.
         distance: of the target, metres, in the typical view.
         far, near: (rows, columns) over the frame, row by row, at the cells' centres; NaN where the camera has
             no image.
@@ -136,7 +136,7 @@ class _Variances:
         # rays may have lengths of their own: places along them, in units of the distance
         slopes = _settled(scatter, rays, fitted, distance)
         self.fitted = fitted
-        self.model, self.alike = _spread(slopes[:fitted], scatter.model), _spread(slopes, scatter.alike)
+        self.model, self.alike = _spread(slopes[:fitted], scatter.repeated), _spread(slopes, scatter.alike)
         self.alike *= given.copies
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
         self.moved = (by_view**2).sum(1)  # (n, m)

@@ -40,7 +40,18 @@ def _of_default(s: Situation) -> bool:
 
 ADVICE: tuple[Advice, ...] = (
     Advice(
-        "few", lambda s: f"Take {15 - s.distinct} more photographs, the target tilted another way in each."
+        "few",
+        lambda s: f"Take {max(3, 15 - s.distinct)} more photographs, the target tilted another way in each.",
+    ),
+    Advice(
+        "unknown",
+        _plain("Calibrate with --method decoupled."),
+        lambda s: not _of_default(s),
+        (("--method", "decoupled"),),
+    ),
+    Advice(
+        "unknown",
+        _plain("Check that the target is what was said and that its corners were found where they are."),
     ),
     Advice(
         "photographs",

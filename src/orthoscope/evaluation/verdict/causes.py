@@ -131,9 +131,15 @@ def _as_far_as_it_goes(s: Situation) -> Grade:
 CAUSES: tuple[Cause, ...] = (
     Cause(
         "few",
-        lambda s: s.views < FEWEST_PHOTOGRAPHS or isnan(s.error_px),
+        lambda s: s.views < FEWEST_PHOTOGRAPHS or (isnan(s.error_px) and s.distinct < FEW_VIEWS),
         lambda s: Grade.NO if s.views < 2 or isnan(s.error_px) else Grade.USABLE,
         lambda s: f"{_photograph(s.views)} cannot tell how far off it is",
+    ),
+    Cause(
+        "unknown",
+        lambda s: isnan(s.error_px),
+        lambda s: Grade.NO,
+        lambda s: "no richer camera that it could be compared with can be fitted to these photographs",
     ),
     Cause(
         "lens",

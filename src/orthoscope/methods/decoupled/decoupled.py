@@ -263,7 +263,7 @@ def _calibration(
         detections=used,
         method="decoupled",
         settings=settings,
-        uncertainty=Uncertainty(names, scatter.parameters, scatter.model[:k, :k]),
+        uncertainty=Uncertainty(names, scatter.parameters, scatter.repeated[:k, :k]),
         status=fit.status,
         steps=candidates.flat(model.base).steps + fit.steps,
         version=__version__,

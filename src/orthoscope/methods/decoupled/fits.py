@@ -8,6 +8,7 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.fits import Fits, OwnFit, RichestFit
+from orthoscope.fitting.initial_camera import formula_for
 from orthoscope.fitting.leave_one_out import leave_one_out
 from orthoscope.fitting.near_copies import near_copies
 from orthoscope.fitting.scatter import scatter_of
@@ -107,10 +108,13 @@ def _model(calibration: Calibration) -> Model:
 
 def _base(calibration: Calibration) -> str:
     """The formula to put the free lens on: the calibration's own base, or its formula with all its
-    coefficients.
+    coefficients, or the one that suits how far its corners lie from the axis.
     """
     if base := calibration.settings.get("base"):
         return str(base)
     lens = calibration.camera.lens
     name = lens_name(lens.base if isinstance(lens, FreeLens) else lens)
-    return name if name in RICHEST_BASES else "brown"
+    if name in RICHEST_BASES:
+        return name
+    pixels = np.concatenate([view.pixels for view in calibration.detections.views])
+    return formula_for(calibration.camera.unproject(pixels))
