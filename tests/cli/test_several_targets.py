@@ -59,3 +59,20 @@ def test_auto_says_which_target_is_seen_and_calibrate_what_to_say(run, tmp_path)
     refused = run("calibrate", tmp_path / "a.png", "--target", "auto", "-o", tmp_path / "camera")
     assert refused.code == 2
     assert "chessboard:7x5:25mm" in refused.err
+
+
+def test_a_target_that_no_photograph_shows_is_told_of(run, tmp_path):
+    pose = Pose(np.eye(3), np.array([-0.07, -0.05, 0.4]))
+    picture = Renderer(CAMERA).photograph(parse_target(SPECS[0]), pose, rng=np.random.default_rng(0))
+    write_image(tmp_path / "a.png", picture)
+    targets = [word for spec in SPECS for word in ("--target", spec)]
+    done = run("detect", tmp_path / "a.png", *targets, "-o", tmp_path / "d.json")
+    assert done.code == 0, done.err
+    assert f"remark     {SPECS[1]}: was found in none of 1 photographs; expected in some of them." in done.out
+
+
+def test_views_of_several_targets_are_not_simulated_and_that_is_said(run, tmp_path):
+    targets = [word for spec in SPECS for word in ("--target", spec)]
+    refused = run("simulate", *targets, "-o", tmp_path)
+    assert refused.code == 2
+    assert f"simulate was given 2 targets ({' + '.join(SPECS)}); expected one" in refused.err
