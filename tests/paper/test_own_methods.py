@@ -65,6 +65,7 @@ def test_what_a_function_of_ones_own_raises_is_an_outcome_with_its_kind():
         trial_judged(PAPER[0]._replace(settings={"lens": "none"}), data)
 
 
+@pytest.mark.slow
 def test_one_figure_alone_has_its_own_file_and_ones_own_method_in_it():
     plan = replace(FEW, only=("fig4",), own=(PaperEntry("mine", three_coefficients, {}),))
     made = documents(run(plan))

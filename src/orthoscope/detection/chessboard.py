@@ -15,6 +15,7 @@ fails: no corner is better than a wrong one.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,6 +75,14 @@ RIM_PX = 2.0
 MOST_DOUBTFUL_SHARE = 0.4
 
 
+class _Laid(NamedTuple):
+    """A lattice laid on the board: ids (n,) in ascending order, pixels (n,2), and which of them are sure."""
+
+    ids: Int[ndarray, " n"]
+    pixels: Float[ndarray, "n 2"]
+    sure: Bool[ndarray, " n"]
+
+
 def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | Unseen:
     """The inner corners of a board, or of the part of it that can be seen.
 
@@ -92,7 +101,8 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             f"a board of {board.columns}x{board.rows} inner corners cannot be found in photographs; expected"
             " at least 3x3."
         )
-    parts, hanging, open_ = [], 0, False
+    parts: list[_Laid] = []
+    hanging, open_ = 0, False
     for found, copy, others in _hanging_together(grey):
         if len(found.pixels) > FLOOR_RATIO * board.columns * board.rows:
             break
@@ -106,17 +116,24 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         if sight and len(sight.ids) == board.columns * board.rows:
             large = (other for other in others if len(other.pixels) >= SECOND_BOARD_SHARE * len(sight.ids))
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in large)
-            return sight._replace(remark=TWICE) if alike else sight
+            return _sure(sight, TWICE if alike else "")
         parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
-    best = max(parts, key=lambda sight: len(sight.ids), default=None)
+    best = max(parts, key=lambda sight: int(sight.sure.sum()), default=None)
     count = board.columns * board.rows
     if ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count and (
         best is None or len(best.ids) > 0.8 * count
     ):
         best = _by_opencv(grey, board) or best
     if best:
-        return best
+        return _sure(best)
     return Unseen("is in it in part only, and which part cannot be told" if open_ else "was not found in it")
+
+
+def _sure(laid: _Laid, remark: str = "") -> Sight | Unseen:
+    """The corners of a board that are sure."""
+    if laid.sure.sum() < FEWEST_PART_CORNERS:
+        return Unseen("is in it, but too blurred, dim or small to say where its corners are")
+    return Sight(laid.ids[laid.sure], laid.pixels[laid.sure], remark)
 
 
 def _in_photograph(
@@ -182,7 +199,7 @@ def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, l
                 yield one, copy, found[number:]
 
 
-def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> Sight | None:
+def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> _Laid | None:
     """The corners with their ids, refined; None where the grid is not the board's or the ids are open."""
     ways = placements(grid, board.columns, board.rows)
     arms = np.ones(grid.seen.shape)
@@ -195,9 +212,9 @@ def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -
     ids = _first_way(ways, grid.corners, whole)
     if isinstance(board, MarkedChessboard):
         arms[np.isin(ids, board.marked_corners())] = board.arm
-    pixels, good = _refined(grey, grid.corners, grid.seen, arms)
+    pixels, good, sure = _refined(grey, grid.corners, grid.seen, arms)
     order = np.argsort(ids[good])
-    return Sight(ids[good][order], pixels[good][order])
+    return _Laid(ids[good][order], pixels[good][order], sure[good][order])
 
 
 def _alike(ways: list[ndarray], seen: Bool[ndarray, "r c"], symmetries: tuple[ndarray, ...]) -> bool:
@@ -221,8 +238,8 @@ def _refined(
     corners: Float[ndarray, "r c 2"],
     seen: Bool[ndarray, "r c"],
     arms: Float[ndarray, "r c"],
-) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"]]:
-    """The grid's corners in the photograph, and which of them are good."""
+) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"], Bool[ndarray, "r c"]]:
+    """The grid's corners in the photograph, which of them are good, and which of these are sure."""
     inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(-1)
     row, column = np.nonzero(seen | inside)
     places = np.stack([column, row], axis=1).astype(float)
@@ -239,6 +256,7 @@ def _refined(
             np.where(off[:, None], again.pixels, fine.pixels),
             np.where(off, again.believed, fine.believed),
             np.where(off, again.explained, fine.explained),
+            np.where(off, again.sure, fine.sure),
         )
         off = _off(fine, places)
     fine, off = _on_smooth_grid(grey, fine, places, off, arms[row, column])
@@ -249,7 +267,9 @@ def _refined(
         good[:] = False
     pixels = corners.copy()
     pixels[row, column] = fine.pixels
-    return pixels, good
+    sure = np.zeros_like(seen)
+    sure[row, column] = fine.sure
+    return pixels, good, sure
 
 
 def _on_smooth_grid(
@@ -272,13 +292,14 @@ def _on_smooth_grid(
     )
     if not away.any():
         return fine, off
-    pixels, believed, off = fine.pixels.copy(), fine.believed.copy(), off.copy()
+    pixels, believed, sure, off = fine.pixels.copy(), fine.believed.copy(), fine.sure.copy(), off.copy()
     pixels[on[away]] = foreseen[away]
     again = refined(grey, pixels[on], places[on], approach=False, arm=arms[on])
     pixels[on[away]], believed[on[away]] = again.pixels[away], again.believed[away]
+    sure[on[away]] = again.sure[away]
     moved = np.hypot(*(again.pixels - foreseen).T)
     off[on[away]] = ((moved > limit) | ~again.believed)[away]
-    return Refined(pixels, believed, fine.explained), off
+    return Refined(pixels, believed, fine.explained, sure), off
 
 
 def _without_strays(
@@ -290,7 +311,7 @@ def _without_strays(
         on = np.flatnonzero(~off)
         if len(on) < FEWEST_PART_CORNERS:
             break
-        some = Refined(fine.pixels[on], fine.believed[on], fine.explained[on])
+        some = Refined(*(part[on] for part in fine))
         strays = _off(some, places[on])
         if not strays.any():
             break
@@ -310,7 +331,7 @@ def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
     )
 
 
-def _by_opencv(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | None:
+def _by_opencv(grey: ndarray, board: Chessboard | MarkedChessboard) -> _Laid | None:
     """What OpenCV's finders see, if it is the whole board."""
     for rough in opencv_boards(grey, board.columns, board.rows):
         corners = rough.reshape(board.rows, board.columns, 2)

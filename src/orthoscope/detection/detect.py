@@ -96,7 +96,7 @@ def detect(
     ]
     if not views or size is None:
         raise CalibrationError(_nothing_found(given, looks, target, aside))
-    remarks += _if_another(given, looks, target, views)
+    remarks += [*_never_seen(looks, target), *_if_another(given, looks, target, views)]
     return Detections(target, size, tuple(views), tuple(aside), remarks=tuple(remarks))
 
 
@@ -179,6 +179,21 @@ def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, asi
         return f"{told} There seems to be {_instead(board, target.board, where)}."
     advice = target.board.advice if target.board else "See that it is whole, sharp and lit"
     return f"{told} {advice}:{reasons}"
+
+
+def _never_seen(looks: list[_Look], target: Target) -> list[Remark]:
+    """A remark on each of several targets that no photograph shows."""
+    count = sum(look.size is not None for look in looks)
+    never = [
+        member
+        for number, member in enumerate(target.members)
+        if not any(number in look.found for look in looks)
+    ]
+    told = f"was found in none of {count} photographs; expected in some of them."
+    return [
+        Remark(member.name, f"{told} {member.board.advice if member.board else 'See that it is there'}")
+        for member in never
+    ]
 
 
 def _board_instead(given: list[Picture], target: Chessboard) -> tuple[int, int] | None:

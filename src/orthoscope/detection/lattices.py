@@ -23,6 +23,8 @@ __all__ = ["CornerLattice", "lattices"]
 NEIGHBOUR_CANDIDATES = 16
 # The edge is off the direction to the neighbour, and off the neighbour's edge, by less than this, radians.
 WIDEST_TURN = np.deg2rad(22.0)
+# A link is at most so many times as long as the next one of its line.
+LONGEST_STEP = 2.0
 # A lattice worth telling of has at least this many corners.
 FEWEST_LATTICE_CORNERS = 4
 
@@ -51,7 +53,7 @@ def lattices(points: SaddlePoints) -> list[CornerLattice]:
     """What hangs together, the most corners first."""
     if len(points.pixels) < FEWEST_LATTICE_CORNERS:
         return []
-    links = _mutual(_neighbours(points))
+    links = _single_steps(_mutual(_neighbours(points)), points.pixels)
     left, count = np.ones(len(links), dtype=bool), (links >= 0).sum(1)
     listed, edges = links.tolist(), points.edges.tolist()
     found = []
@@ -99,6 +101,14 @@ def _mutual(links: Int[ndarray, "n 4"]) -> Int[ndarray, "n 4"]:
     """The links that both ends have."""
     back = (links[links] == np.arange(len(links))[:, None, None]).any(-1)
     return np.where((links >= 0) & back, links, -1)
+
+
+def _single_steps(links: Int[ndarray, "n 4"], pixels: Float[ndarray, "n 2"]) -> Int[ndarray, "n 4"]:
+    """The links without those that leap over corners that are not seen, as behind a mark: they are much
+    longer than the next link of their line.
+    """
+    length = np.where(links >= 0, np.linalg.norm(pixels[links] - pixels[:, None], axis=-1), np.inf)
+    return _mutual(np.where(length > LONGEST_STEP * np.roll(length, 2, axis=1), -1, links))
 
 
 def _spread(

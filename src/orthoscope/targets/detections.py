@@ -72,10 +72,10 @@ class SetAside(NamedTuple):
 
 
 class Remark(NamedTuple):
-    """What a person should know of how a photograph was seen, though it takes part.
+    """What a person should know of how a photograph was seen, though it takes part, or of a target.
 
     Attributes:
-        image: the photograph's name.
+        image: the photograph's name, or the target's.
         words: a sentence without its full stop.
     """
 

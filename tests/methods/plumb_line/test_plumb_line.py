@@ -51,6 +51,7 @@ def test_three_streets_tell_the_lens_within_a_pixel_over_the_frame(lens):
     assert 0.05 < found.rms_px < 0.12  # the noise of an edge, not of what is bent in space
 
 
+@pytest.mark.slow
 def test_what_is_bent_in_space_is_left_out():
     """Nine facades' edges in ten are taken, of cables and crowns next to none."""
     truth = street_camera(BARREL)

@@ -259,7 +259,7 @@ def _calibration(
     shape = fit.shape
     return Calibration(
         camera=camera,
-        camera_from_target=resect(camera, used, shape=shape, near=fit.estimate.poses),
+        camera_from_target=resect(camera, used, shape=shape, near=fit.poses),
         detections=used,
         method="decoupled",
         settings=settings,
