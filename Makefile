@@ -8,8 +8,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
+# Workers and the commands that tests start then share what one of them has compiled.
+export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: release-check demo test test-all check format lint types rooms picture bench bench-peers clean
+.PHONY: compiled release-check demo test test-all check format lint types rooms picture bench bench-peers clean
 
 demo: $(VENV)/installed
 	$(BIN)/orthoscope demo -o demo
@@ -42,7 +44,11 @@ $(VENV)/installed: pyproject.toml
 	$(BIN)/pip install --quiet --editable . --group dev
 	touch $@
 
-bench: $(VENV)/installed
+compiled: $(VENV)/installed
+	$(BIN)/python -m compileall -q src benchmarks
+
+# as an installed package is: else each process compiles again where Python may not write beside the source
+bench: compiled
 	$(BIN)/python -m benchmarks $(ONLY)
 
 bench-peers:

@@ -116,6 +116,14 @@ def test_a_target_that_does_not_match_is_told_which_size_seems_to_be_there(run, 
     assert not (tmp_path / "out").exists()
 
 
+def test_a_size_that_the_photographs_do_not_have_is_refused(run, scene, tmp_path):
+    found = simulate_detections(scene, noise_px=0.1, rng=np.random.default_rng(0))
+    save(found, tmp_path / "found.json")
+    told = calibrate(run, tmp_path / "found.json", "--image-size", "64x48", out=tmp_path / "camera")
+    assert told.code == 2
+    assert "--image-size says 64x48" in told.err
+
+
 def test_photographs_without_a_board_leave_with_1(run, tmp_path):
     grey = np.random.default_rng(0).integers(90, 110, (240, 320), dtype=np.uint8)
     (tmp_path / "photos").mkdir()

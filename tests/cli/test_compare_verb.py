@@ -40,7 +40,7 @@ def test_it_prints_a_table_the_best_first_and_what_follows(run, calibrated, tmp_
     assert rows[0].split()[0] == "fccm:brown"
     assert {row.split()[0] for row in rows[1:3]} == {"fccm:brown:k1", "mldc"}
     assert re.fullmatch(r"fccm:brown +0\.\d+ ± 0\.\d+ +best( +[\d.]+){4} +brown +flat", rows[0])
-    assert "verdict    fccm:brown foresees these photographs best" in told.out
+    assert "verdict    fccm:brown predicts these photographs best" in told.out
     assert re.search(r"The next, (fccm:brown:k1|mldc), loses", told.out)
     assert {path.name for path in tmp_path.iterdir()} == FILES
     assert all(str(tmp_path / name) in rows[-1] for name in FILES)
@@ -64,7 +64,7 @@ def test_its_json_has_every_number_of_every_entry_and_is_the_file(run, calibrate
     assert np.sqrt(sum(best["squares"]) / 540) == pytest.approx(best["held_out_px"])
     assert all(best[key] > 0 for key in ("error_px", "nce", "rms_px", "parameters", "seconds"))
     assert "failure" not in best
-    assert numbers["conclusions"][0].startswith("fccm:brown foresees")
+    assert numbers["conclusions"][0].startswith("fccm:brown predicts")
 
 
 def test_one_that_cannot_is_told_with_the_reason_and_the_others_are_compared(run, calibrated, tmp_path):
@@ -82,7 +82,7 @@ def test_one_that_cannot_is_told_with_the_reason_and_the_others_are_compared(run
     )
     assert told.code == 0, told.err
     assert re.search(r"^cannot     nmldc: .*straightness cannot be judged", told.out, re.MULTILINE)
-    assert "verdict    fccm:brown:k1 foresees" in told.out
+    assert "verdict    fccm:brown:k1 predicts" in told.out
     assert json.loads((tmp_path / "out/comparison.json").read_text())["standings"][1]["held_out_px"] is None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from orthoscope.files.images import write_image
 from orthoscope.formats.own.json import load
@@ -16,6 +17,7 @@ CAMERA = Camera((640, 480), Intrinsics(600.0, 600.0, 320.0, 240.0), Brown())
 SPECS = "chessboard:6x5:25mm", "charuco:6x6:25mm:18mm:DICT_5X5_100"
 
 
+@pytest.mark.slow
 def test_each_target_that_is_named_has_a_view_of_each_photograph_and_a_part_in_the_camera(run, tmp_path):
     boards, renderer = [parse_target(spec) for spec in SPECS], Renderer(CAMERA)
     for number in range(4):
@@ -57,3 +59,20 @@ def test_auto_says_which_target_is_seen_and_calibrate_what_to_say(run, tmp_path)
     refused = run("calibrate", tmp_path / "a.png", "--target", "auto", "-o", tmp_path / "camera")
     assert refused.code == 2
     assert "chessboard:7x5:25mm" in refused.err
+
+
+def test_a_target_that_no_photograph_shows_is_told_of(run, tmp_path):
+    pose = Pose(np.eye(3), np.array([-0.07, -0.05, 0.4]))
+    picture = Renderer(CAMERA).photograph(parse_target(SPECS[0]), pose, rng=np.random.default_rng(0))
+    write_image(tmp_path / "a.png", picture)
+    targets = [word for spec in SPECS for word in ("--target", spec)]
+    done = run("detect", tmp_path / "a.png", *targets, "-o", tmp_path / "d.json")
+    assert done.code == 0, done.err
+    assert f"remark     {SPECS[1]}: was found in none of 1 photographs; expected in some of them." in done.out
+
+
+def test_views_of_several_targets_are_not_simulated_and_that_is_said(run, tmp_path):
+    targets = [word for spec in SPECS for word in ("--target", spec)]
+    refused = run("simulate", *targets, "-o", tmp_path)
+    assert refused.code == 2
+    assert f"simulate was given 2 targets ({' + '.join(SPECS)}); expected one" in refused.err

@@ -74,5 +74,5 @@ def test_an_outline_that_is_not_whole_is_no_disc():
     x, y = np.rint(truth[20]).astype(int)
     covered[y : y + 20, x - 20 : x + 20] = 200
     rough = Ellipses(truth[19:21], np.tile(np.eye(2) * 8.0, (2, 1, 1)))
-    assert np.isfinite(refined_discs(picture, rough).centres).all()
-    assert np.isfinite(refined_discs(covered, rough).centres[:, 0]).tolist() == [True, False]
+    assert np.isfinite(refined_discs(picture, rough).ellipses.centres).all()
+    assert np.isfinite(refined_discs(covered, rough).ellipses.centres[:, 0]).tolist() == [True, False]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -9,15 +10,24 @@ from numpy.testing import assert_allclose
 
 from helpers.boards import BOARD, NARROW, photographs_of
 from orthoscope.evaluation.camera_check import check_camera
+from orthoscope.evaluation.evaluate import examine
 from orthoscope.evaluation.verdict.grades import Grade
+from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses import Brown
 from orthoscope.targets.detections import Detections
 
 
 @pytest.fixture(scope="module")
-def photographs() -> Detections:
-    return photographs_of(BOARD.points, 10, 5, noise_px=0.1)
+def photographs() -> Iterator[Detections]:
+    """Whose own camera is calibrated and judged once for all tests."""
+    taken = photographs_of(BOARD.points, 10, 5, noise_px=0.1)
+    own = decoupled(taken)
+    judged = examine(own)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("orthoscope.evaluation.camera_check.decoupled", lambda _: own)
+        patch.setattr("orthoscope.evaluation.camera_check.examine", lambda _: judged)
+        yield taken
 
 
 def with_k(**changes: float) -> Camera:

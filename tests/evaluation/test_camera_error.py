@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from helpers.bent_boards import bowed, photographed_with
 from helpers.scenes import NARROW, WIDE, photographed
 from orthoscope.evaluation.camera_error import CameraError, predicted_error, rms_difference, seen_places
+from orthoscope.evaluation.region import between
 from orthoscope.evaluation.verdict.situation import FINE_PX
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.leave_one_out import leave_one_out
@@ -47,7 +48,8 @@ def noisy() -> Detections:
 
 @pytest.fixture(scope="module")
 def predicted(noisy: Detections) -> CameraError:
-    return predicted_error(scattered(noisy), places(noisy), distance=0.5)
+    corners = np.concatenate([view.pixels for view in noisy.views])
+    return predicted_error(scattered(noisy), places(noisy), distance=0.5, corners=corners)
 
 
 @pytest.mark.parametrize("camera", [NARROW, WIDE], ids=["narrow", "wide"])
@@ -165,14 +167,49 @@ def test_errors_alike_within_views_are_seen(noisy: Detections):
     assert tau[0] > 5.0
 
 
-def test_places_are_trusted_in_the_region_and_nowhere_else(predicted: CameraError):
+def over_the_frame(columns: int, rows: int) -> np.ndarray:
+    """Pixels at the centres of cells, row by row."""
+    x, y = np.meshgrid((np.arange(columns) + 0.5) * 640 / columns, (np.arange(rows) + 0.5) * 480 / rows)
+    return np.stack([x.ravel(), y.ravel()], axis=1) - 0.5
+
+
+def test_places_are_trusted_where_the_error_is_small_and_corners_are_around(
+    noisy: Detections, predicted: CameraError
+):
     height, width = predicted.far.shape
-    x, y = np.meshgrid((np.arange(width) + 0.5) * 640 / width, (np.arange(height) + 0.5) * 480 / height)
-    cells = np.stack([x.ravel(), y.ravel()], axis=1)
+    cells, pixels = over_the_frame(width, height), np.concatenate([view.pixels for view in noisy.views])
     trusted = predicted.trusted(cells)
     assert trusted.any()
     assert predicted.limit_px == FINE_PX  # what is trusted is what a grade calls good
+    assert (predicted.far.ravel()[trusted] < 1.03 * FINE_PX).all()  # the way to its border goes in steps
+    assert (cells[trusted] >= pixels.min(0)).all()
+    assert (cells[trusted] <= pixels.max(0)).all()
     assert not predicted.trusted(np.array([[-50.0, 20.0], [700.0, 240.0]])).any()
-    assert np.quantile(predicted.far.ravel()[trusted], 0.95) < FINE_PX
-    if not trusted.all():
-        assert predicted.far.ravel()[trusted].mean() < predicted.far.ravel()[~trusted].mean()
+    good = (predicted.far.ravel() < FINE_PX) & between(pixels, cells)
+    assert trusted.sum() > 0.95 * good.sum()  # the region is star-shaped, and so is what is good here
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.1, 0.3])
+def test_the_share_of_the_frame_that_is_said_is_that_which_is_trusted(noise: float):
+    detections = photographed(NARROW, 9, noise_px=noise)
+    error = predicted_error(scattered(detections), places(detections), distance=0.5)
+    assert error.share == pytest.approx(error.trusted(over_the_frame(160, 120)).mean(), abs=0.004)
+    assert error.share <= error.seen_share
+
+
+def test_what_is_wrong_beside_the_scatter_counts_everywhere(noisy: Detections, predicted: CameraError):
+    """In the headline, in the map, and in the region."""
+    scatter, seen = scattered(noisy), places(noisy)
+    corners = np.concatenate([view.pixels for view in noisy.views])
+    apart = predicted_error(scatter, seen, distance=0.5, corners=corners, differ_px=0.4)
+    assert_allclose(apart.far, np.hypot(predicted.far, 0.4))
+    assert apart.seen_px == pytest.approx(np.hypot(predicted.seen_px, 0.4))
+    assert apart.share <= predicted.share
+    other = moved(scatter.camera, np.array([1.0, 1.0, 0.0, 0.0, 0.01, 0.0]))
+    off = predicted_error(scatter, seen, distance=0.5, judged=other)
+    assert off.seen_px == pytest.approx(
+        np.hypot(predicted.seen_px, rms_difference(other, scatter.camera, seen)), rel=1e-3
+    )
+    same = predicted_error(scatter, seen, distance=0.5, judged=scatter.camera)
+    assert same.seen_px == predicted.seen_px
+    assert predicted_error(scatter, seen, distance=0.5, copies=4.0).seen_px > predicted.seen_px

@@ -31,6 +31,7 @@ DIFFERING = {
     "zoom": replace(MANY, cameras=("zoom", 0.02)),
     "centre": replace(MANY, cameras=("other", 0.015)),
     "shutter": replace(MANY, shutter=0.003),
+    "lens": replace(MANY, cameras=("lenses", 0.4)),
 }
 
 
@@ -49,6 +50,7 @@ def test_what_changed_between_photographs_is_named(kind):
     found = disagreement(richest_fit(detections), detections)
     assert found.certain
     assert found.kind == kind
+    assert (found.by_px == 0.0) == (kind == "shutter")  # the image is sheared, the camera is one
 
 
 FAR_APART = [

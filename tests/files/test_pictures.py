@@ -43,6 +43,19 @@ def test_every_page_of_a_file_is_a_picture(tmp_path):
         assert_array_equal(picture.grey(most_megapixels=1.0), page)
 
 
+@pytest.mark.skipif(not hasattr(cv2, "imdecodeanimation"), reason="this OpenCV reads no animations")
+@pytest.mark.parametrize("suffix", [".gif", ".webp"])
+def test_every_picture_of_an_animation_is_a_picture(tmp_path, suffix):
+    image = pytest.importorskip("PIL.Image")
+    pages = [np.roll(RAMP, 7 * shift, axis=1) for shift in range(3)]
+    first, *others = (image.fromarray(page) for page in pages)
+    first.save(tmp_path / f"scan{suffix}", save_all=True, append_images=others, lossless=True)
+    found = pictures(tmp_path)
+    assert [picture.name for picture in found] == [f"scan{suffix}#{page}" for page in (1, 2, 3)]
+    for picture, page in zip(found, pages, strict=True):
+        assert_array_equal(picture.grey(most_megapixels=1.0), page)
+
+
 def test_contrast_follows_the_picture_and_one_infinite_pixel_does_no_harm():
     thermal = (29500 + RAMP.astype(float) / 2).astype(np.uint16)
     shown = to_grey(thermal)

@@ -70,6 +70,13 @@ def test_poses_go_along_where_the_record_says_so(tmp_path, tool):
             assert_allclose(pose.translation, poses()[image].translation, atol=1e-14)
 
 
+@pytest.mark.parametrize("tool", [name for name, record in FORMATS.items() if len(record.suffixes) > 1])
+def test_a_suffix_that_the_tool_does_not_have_is_refused(tmp_path, tool):
+    with pytest.raises(InputError, match=r"camera\.txt_ does not say which file"):
+        export(camera_held(FORMATS[tool], FORMATS[tool].holdings[0]), tmp_path / "camera.txt_", tool)
+    assert not list(tmp_path.iterdir())
+
+
 @for_every_tool
 def test_the_first_pixel_stands_where_the_record_says(tmp_path, tool):
     """A camera whose principal point is the first pixel's centre shows the tool's name for it."""

@@ -15,6 +15,8 @@ __all__ = ["SIZE", "camera_held", "farthest_apart", "poses", "some_pixels"]
 SIZE = (640, 480)
 # A value for each coefficient, small enough that no formula folds within the frame.
 USUAL = {"k": 0.03, "p": 1e-3, "s": 1e-3, "t": 0.01, "w": 0.8, "l": 0.1, "a": 0.02}
+# Of coefficients that go by a Greek letter.
+GREEK = {"xi": -0.1, "alpha": 0.6, "beta": 0.9}
 
 
 def camera_held(record: Format, holding: Holding, *, focal: float = 400.0 + 1 / 3) -> Camera:
@@ -22,7 +24,7 @@ def camera_held(record: Format, holding: Holding, *, focal: float = 400.0 + 1 / 
     kind = LENSES["brown" if holding.lens == FREE else holding.lens]
     signs = {name: (-1.0) ** i for i, name in enumerate(kind.names())}
     values = {
-        name: signs[name] * USUAL[name[0]] if name[0] in "kpsta" else USUAL[name[0]]
+        name: GREEK.get(name) or USUAL[name[0]] * (signs[name] if name[0] in "kpsta" else 1.0)
         for name in holding.coefficients
         if name in kind.names() and name not in ("a0", "a1", "scale")
     }

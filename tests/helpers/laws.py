@@ -13,7 +13,18 @@ from numpy import ndarray
 
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Formula, Lens
-from orthoscope.models.lenses import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational, Stereographic
+from orthoscope.models.lenses import (
+    Brown,
+    Division,
+    DoubleSphere,
+    Eucm,
+    Fet,
+    Fov,
+    KannalaBrandt,
+    Pfet,
+    Rational,
+    Stereographic,
+)
 from orthoscope.models.spline import Displacement, Lattice
 
 __all__ = [
@@ -66,6 +77,14 @@ LENSES_TO_TRY: dict[str, Formula] = {
     "kannala_brandt strong": KannalaBrandt(k1=0.1, k2=-0.03, k3=0.01, k4=-0.001),
     "kannala_brandt folding": KannalaBrandt(k1=-0.2, k2=0.02, k3=-0.01, k4=0.001),
     "stereographic": Stereographic(),
+    "double_sphere": DoubleSphere(),
+    "double_sphere wide": DoubleSphere(xi=-0.2, alpha=0.6),
+    "double_sphere mild": DoubleSphere(xi=0.3, alpha=0.2),
+    "double_sphere no distortion": DoubleSphere(xi=0.0, alpha=0.0),
+    "eucm": Eucm(),
+    "eucm wide": Eucm(alpha=0.7, beta=0.9),
+    "eucm mild": Eucm(alpha=0.2, beta=1.3),
+    "eucm no distortion": Eucm(alpha=0.0),
 }
 
 

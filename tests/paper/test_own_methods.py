@@ -67,6 +67,7 @@ def test_what_a_function_of_ones_own_raises_is_an_outcome_with_its_kind():
         trial_judged(PAPER[0]._replace(settings={"lens": "none"}), data)
 
 
+@pytest.mark.slow
 def test_one_figure_alone_has_its_own_file_and_ones_own_method_in_it():
     plan = replace(FEW, only=("fig4",), own=(PaperEntry("mine", three_coefficients, {}),))
     made = documents(run(plan))
@@ -124,6 +125,7 @@ def test_levels_that_cannot_be_read_are_a_wrong_command(tmp_path):
         assert text in told.output
 
 
+@pytest.mark.slow
 def test_the_example_puts_opencv_into_figure_4_in_processes(tmp_path):
     """Two processes start and compute: three seconds."""
     command = [sys.executable, str(EXAMPLE), "--quick", "--out", str(tmp_path)]

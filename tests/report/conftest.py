@@ -119,6 +119,8 @@ def _camera_error(calibration: Calibration) -> CameraError:
         near=0.8 * far,
         limit_px=0.24,
         region=region,
+        share=0.6,
+        seen_share=0.7,
         without_px=0.01 * (1.0 + np.arange(views) % 5),
     )
 

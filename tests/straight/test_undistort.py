@@ -62,7 +62,9 @@ def test_the_threads_of_opencv_are_as_many_after_a_folder_as_before(tmp_path):
 
 
 def test_a_photograph_of_another_size_is_refused():
-    with pytest.raises(InputError, match=r"the photograph is 320x200; this camera was calibrated at 320x240"):
+    with pytest.raises(
+        InputError, match=r"the photographs are 320x200; this camera was calibrated at 320x240.*--crop"
+    ):
         undistort(PICTURE[:200], CAMERA)
 
 

@@ -40,7 +40,7 @@ def test_a_board_is_found_in_its_own_page_where_it_is_drawn(board):
     target = target_of(board)
     page = page_of(target)
     picture = cv2.imdecode(np.frombuffer(png(page), np.uint8), cv2.IMREAD_GRAYSCALE)
-    shrink = max(picture.shape) / 1500
+    shrink = max(picture.shape) / 1000
     small = cv2.resize(picture, None, fx=1 / shrink, fy=1 / shrink, interpolation=cv2.INTER_AREA)
     sight = see(small, target)
     assert isinstance(sight, Sight)

@@ -82,6 +82,7 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
     ),
 )
 @click.option("--report/--no-report", default=True, help="Whether to write OUT/report.html.")
+@options.strict
 @options.verbose
 @options.as_json
 def calibrate(photos: tuple[str, ...], **settings: Any) -> None:
@@ -113,6 +114,7 @@ def calibrate_into(
     keep: str = "all",
     corrected: bool = False,
     report: bool = True,
+    strict: bool = False,
     verbose: bool = False,
     as_json: bool = False,
 ) -> Any:
@@ -121,6 +123,7 @@ def calibrate_into(
 
     with bar("starting"):  # loading takes most of the first half second
         from orthoscope.cli.executors import processes, threads
+        from orthoscope.cli.exit_codes import leave_unless_usable
         from orthoscope.cli.inputs import detections_from
         from orthoscope.cli.judged import EVALUATION_NAME
         from orthoscope.cli.method_settings import settings_from
@@ -174,6 +177,7 @@ def calibrate_into(
         tell_json(text_of(evaluation))
     else:
         tell(*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written)))
+    leave_unless_usable(evaluation.verdict.grade, strict=strict)
     return evaluation
 
 

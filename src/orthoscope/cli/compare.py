@@ -25,7 +25,7 @@ Example:
   decoupled        0.088 ± 0.015           best  0.180      0.067         162     3.30  free   free
   decoupled:brown  0.090 ± 0.013  0.002 ± 0.002  0.189      0.074         141     3.04  brown  free
   fccm:brown       0.172 ± 0.008  0.085 ± 0.011  0.384      0.164           9     0.01  brown  flat
-  verdict    decoupled foresees these photographs best: 0.088 ± 0.015 px on those that were not used.
+  verdict    decoupled predicts these photographs best: 0.088 ± 0.015 px on those that were not used.
              As good, for all that chance allows to say: decoupled:brown (loses 0.002 ± 0.002 px).
              The next, fccm:brown, loses 0.085 ± 0.011 px.
   wrote      comparison/comparison.json, comparison/comparison.html, comparison/comparison.svg

@@ -41,6 +41,7 @@ with --target they show that one, taken as it is said to be.
 @options.own_folds
 @options.jobs
 @options.cluster
+@options.strict
 @options.verbose
 @options.as_json
 def evaluate(
@@ -51,11 +52,13 @@ def evaluate(
     folds: int | None,
     jobs: int | None,
     cluster: str | None,
+    strict: bool,
     verbose: bool,
     as_json: bool,
 ) -> None:
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
     from orthoscope.cli.executors import threads
+    from orthoscope.cli.exit_codes import leave_unless_usable
     from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.judged import EVALUATION_NAME, judged_calibration
     from orthoscope.cli.on_others import json_of, lines_of, on_others
@@ -83,6 +86,7 @@ def evaluate(
             tell_json(text_of(evaluation))
         else:
             tell(*evaluation_lines(evaluation, verbose=verbose))
+        leave_unless_usable(evaluation.verdict.grade, strict=strict)
         return
     own = loaded.detections.target if isinstance(loaded, Calibration) else None
     board = target or (None if found_before else own)  # a camera alone comes with a target, as checked above
@@ -95,3 +99,4 @@ def evaluate(
         tell_json(to_json(json_of(found)))
     else:
         tell(*lines_of(found, verbose=verbose))
+    leave_unless_usable(found.grade, strict=strict)

@@ -17,6 +17,8 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import NoReturn
 
+from orthoscope.geometry.cores import at_once
+
 __all__ = ["cluster", "leave_threads", "processes", "single_threaded", "stopped_by_sigterm", "threads"]
 
 # These variables of the environment tell numpy's libraries how many threads to use.
@@ -37,7 +39,7 @@ def threads(jobs: int | None, address: str | None = None) -> Iterator[Executor]:
     """
     from concurrent.futures import ThreadPoolExecutor
 
-    with cluster(address) if address else _here(ThreadPoolExecutor(jobs or os.cpu_count())) as executor:
+    with cluster(address) if address else _here(ThreadPoolExecutor(at_once(jobs))) as executor:
         yield executor
 
 
@@ -49,7 +51,7 @@ def processes(jobs: int | None, address: str | None = None) -> Iterator[Executor
         jobs: how many fresh processes; as many as there are cores by default.
         address: of a Dask scheduler, whose workers then take the processes' place.
     """
-    jobs = jobs or os.cpu_count() or 1
+    jobs = at_once(jobs)
     if address:
         with cluster(address) as executor:
             yield executor

@@ -14,7 +14,7 @@ import click
 from orthoscope.cli.executors import leave_threads
 from orthoscope.cli.telling import tell
 
-__all__ = ["errors_as_exit_codes"]
+__all__ = ["errors_as_exit_codes", "leave_unless_usable"]
 
 # The verb did what it was asked for.
 DONE = 0
@@ -22,6 +22,8 @@ DONE = 0
 CANNOT_ANSWER = 1
 # The command, or what it was given, is wrong.
 WRONG_COMMAND = 2
+# The verdict is "do not use", and --strict was asked for.
+NOT_TO_BE_USED = 3
 # It was stopped from the keyboard, as shells count it: 128 and the signal's number.
 STOPPED = 130
 # A place that takes no more bytes: a full disk, a full share of it, a broken device, a file at its limit.
@@ -69,6 +71,19 @@ def errors_as_exit_codes() -> Iterator[None]:
         sys.exit(CANNOT_ANSWER)
     except (ValueError, RuntimeError) as error:
         _leave(error)
+
+
+def leave_unless_usable(grade: str, *, strict: bool) -> None:
+    """Leave with a code of its own where a camera must not be used, for scripts that go by it.
+
+    Args:
+        grade: of the verdict.
+        strict: whether that was asked for; else whoever reads the verdict decides.
+    """
+    from orthoscope.evaluation.verdict.grades import Grade
+
+    if strict and grade == Grade.NO:
+        sys.exit(NOT_TO_BE_USED)
 
 
 def _leave(error: Exception) -> None:

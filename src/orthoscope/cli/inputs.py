@@ -42,11 +42,12 @@ def detections_from(
         image_size: needed with a .vnl, which does not know it.
         jobs, executor, progress: as in `detect`.
     Raises:
-        InputError: something needed is missing.
+        InputError: something needed is missing, or contradicts the photographs.
     """
     if len(paths) == 1 and Path(paths[0]).suffix == ".json":
         found = load_detections(paths[0])
         _check_same_target(found, target, paths[0])
+        _check_same_size(found, image_size)
         return found, {}
     if target is None:
         raise InputError(
@@ -74,6 +75,7 @@ def detections_from(
     found = detect(
         files, target, jobs=jobs, executor=executor, progress=progress, most_megapixels=most, topic=topic
     )
+    _check_same_size(found, image_size)
     if others := passed_over(paths, also=MOVING):
         tell(f"passed over {', '.join(f'{count} {end}' for end, count in others.items())}", err=True)
     named = dict(zip(names_of(files), files, strict=True))
@@ -82,6 +84,20 @@ def detections_from(
         for view in found.views
         if (photograph := photograph_of(view.image)) in named
     }
+
+
+def _check_same_size(found: Detections, image_size: tuple[int, int] | None) -> None:
+    """What is said of the photographs' size is so.
+
+    Raises:
+        InputError: another size is named.
+    """
+    if image_size not in (None, tuple(found.image_size)):
+        (width, height), (w, h) = found.image_size, image_size
+        raise InputError(
+            f"the photographs are {width}x{height}; --image-size says {w}x{h}. Leave it out: only a .vnl table"
+            " does not know its size."
+        )
 
 
 def _check_same_target(found: Detections, target: str | Target | None, path: str | Path) -> None:

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from orthoscope.evaluation.camera_check import CameraCheck
     from orthoscope.evaluation.evaluate import UnseenError
     from orthoscope.evaluation.same_board import SameBoard
+    from orthoscope.evaluation.verdict.grades import Grade
     from orthoscope.fitting.calibration import Calibration
     from orthoscope.formats.record import Contents
     from orthoscope.simulation.scene import Scene
@@ -28,6 +29,14 @@ class OnOthers(NamedTuple):
     error: UnseenError
     board: SameBoard | None
     check: CameraCheck | None
+
+    @property
+    def grade(self) -> Grade:
+        """How far the camera may be trusted: by the photographs' own, or else by what is left over."""
+        from orthoscope.evaluation.verdict.verdict import grade_on_others
+
+        error = self.error
+        return self.check.grade if self.check else grade_on_others(error.rms_px, error.detections.image_size)
 
 
 def on_others(loaded: Calibration | Scene | Contents, detections: Detections, *, own_board: bool) -> OnOthers:

@@ -34,6 +34,7 @@ __all__ = [
     "shape",
     "skew",
     "straight_folder",
+    "strict",
     "target",
     "tool_settings",
     "topic",
@@ -180,7 +181,8 @@ lens: Decorator = click.option(
     show_default=True,
     metavar="NAME",
     help=(
-        "free (a formula and a spline on top), brown, rational, kannala_brandt, division, fov, pfet, fet;"
+        "free (a formula and a spline on top), brown, rational, kannala_brandt, double_sphere, eucm, division,"
+        " fov, pfet, fet;"
         " brown:k1,k2 frees just these; auto takes what the method takes: decoupled the free lens, fccm"
         " brown, or kannala_brandt for wide views."
     ),
@@ -200,7 +202,7 @@ shape: Decorator = click.option(
     metavar="KIND",
     help=(
         "The target's shape, for decoupled: flat (as it is said to be), smooth (stretched, bent) or free"
-        " (each corner by itself); by default what foresees best."
+        " (each corner by itself); by default what best predicts photographs left out."
     ),
 )
 base: Decorator = click.option(
@@ -216,7 +218,7 @@ fit: Decorator = click.option(
     metavar="HOW",
     help=(
         "How decoupled fits a formula that --lens or --export asks for: joint (with poses and target) or pairs"
-        " (to what the free lens found); by default what foresees best."
+        " (to what the free lens found); by default what best predicts photographs left out."
     ),
 )
 skew: Decorator = click.option("--skew", is_flag=True, help="Let the pixel axes be oblique.")
@@ -280,6 +282,9 @@ as_json: Decorator = click.option(
 )
 calibration_file: Decorator = click.argument(
     "calibration", type=click.Path(path_type=Path), metavar="CALIBRATION.json"
+)
+strict: Decorator = click.option(
+    "--strict", is_flag=True, help='Exit with 3 where the verdict is "do not use", once all is written.'
 )
 verbose: Decorator = click.option(
     "-v", "--verbose", is_flag=True, help="Print every figure that was found, and what was left out."

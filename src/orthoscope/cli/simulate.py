@@ -48,7 +48,9 @@ Examples:
 )
 @click.option(
     "--target",
-    default="chessboard:9x6:25mm",
+    "targets",
+    multiple=True,
+    default=("chessboard:9x6:25mm",),
     show_default=True,
     metavar="SPEC",
     help="What stands before the camera.",
@@ -104,7 +106,7 @@ def simulate(
     lens: str | None,
     image_size: tuple[int, int] | None,
     focal: float | None,
-    target: str,
+    targets: tuple[str, ...],
     views: int,
     noise: float,
     tilt_noise: bool,
@@ -129,7 +131,7 @@ def simulate(
         _write_papers(papers, noise, seed, out)
         return
     rng = np.random.default_rng(seed)
-    camera, board = _camera(source, lens, image_size, focal), parse_target(target)
+    camera, board = _camera(source, lens, image_size, focal), _only(parse_target(" + ".join(targets)))
     margin = _square(board) if rendered else 0.0  # the outer squares are to be in the picture too
     poses = random_views(
         camera,
@@ -166,6 +168,22 @@ def _write_papers(distortion: str, noise: float, seed: int, out: Path) -> None:
         f"wrote      {out / 'training.json'}, {out / 'test.json'}, and {out / 'truth.json'}: camera, target,"
         " poses"
     )
+
+
+def _only(target: Target) -> Target:
+    """The target, where it is one.
+
+    Raises:
+        InputError: it is several.
+    """
+    from orthoscope.geometry.arrays import InputError
+
+    if target.members:
+        raise InputError(
+            f"simulate was given {len(target.members)} targets ({target.name}); expected one, which all views"
+            " show. Name one --target; orthoscope.simulation.render.Renderer.photograph_of draws several."
+        )
+    return target
 
 
 def _camera(

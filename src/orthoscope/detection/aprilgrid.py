@@ -56,31 +56,34 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
     ids, corners = ids[inside], corners[inside]
     if len(ids) < FEWEST_CORNERS:
         return Unseen(f"was not found in it: {len(markers.numbers)} of its {count} tags were")
-    ids, pixels = _fitted(grey, ids, corners, board)
+    ids, pixels, sure = _fitted(grey, ids, corners, board)
     for _ in range(board.columns + board.rows):
         more, start = _next_to(ids, pixels, board, grey.shape)
         if not len(more):
             break
         before = len(ids)
-        ids, pixels = _fitted(grey, np.concatenate([ids, more]), np.concatenate([pixels, start]), board)
+        ids, pixels, sure = _fitted(grey, np.concatenate([ids, more]), np.concatenate([pixels, start]), board)
         if len(ids) <= before:
             break
-    if len(ids) < FEWEST_CORNERS:
+    if sure.sum() < FEWEST_CORNERS:
         return Unseen(
             f"was not found in it: {len(ids) // 4} of its tags were, but without squares at their corners"
         )
+    ids, pixels = ids[sure], pixels[sure]
     order = np.argsort(ids)
     return Sight(ids[order], pixels[order], remark)
 
 
-def _fitted(grey: ndarray, ids: ndarray, corners: ndarray, board: AprilGrid) -> tuple[ndarray, ndarray]:
-    """The corners at which a saddle was fitted, on their neighbours' lines."""
+def _fitted(
+    grey: ndarray, ids: ndarray, corners: ndarray, board: AprilGrid
+) -> tuple[ndarray, ndarray, ndarray]:
+    """The corners at which a saddle was fitted, on their neighbours' lines, and which of them are sure."""
     places = board.places()[ids] * [1.0, -1.0]  # rows are counted upwards
     fine = refined(grey, corners, places, arm=BORDER_SQUARES / TAG_SQUARES / board.spacing)
     gap = nearest_neighbour(corners, places)
     good = fine.believed & (grid_shape(fine.pixels, places).stray < MOST_STRAY_SHARE)
     good &= np.hypot(*(fine.pixels - corners).T) < FARTHEST_SHARE * np.maximum(gap, LEAST_GAP_PX)
-    return ids[good], fine.pixels[good]
+    return ids[good], fine.pixels[good], fine.sure[good]
 
 
 def _next_to(

@@ -98,7 +98,7 @@ def _grown(
 ) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"]]:
     """Corners fitted where they are foreseen, then those next to them, until no more are found."""
     good = np.zeros(grid.shape[:2], dtype=bool)
-    tried = good.copy()
+    tried, sure = good.copy(), good.copy()
     start = grid
     for _ in range(sum(grid.shape[:2])):
         inside = ((start >= RIM_PX) & (start <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(-1)
@@ -113,7 +113,8 @@ def _grown(
         grid, good = np.full_like(grid, np.nan), np.zeros_like(good)
         grid[row[fits], column[fits]] = fine.pixels[fits]
         good[row[fits], column[fits]] = True
+        sure[row, column] = fits & fine.sure
         if good.sum() < FEWEST_CORNERS:
             break
         start = filled(grid, rounds=1)
-    return grid, good
+    return grid, good & sure

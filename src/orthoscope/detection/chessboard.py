@@ -15,6 +15,7 @@ fails: no corner is better than a wrong one.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from orthoscope.detection.refine import Refined, refined
 from orthoscope.detection.saddle_points import saddle_points
 from orthoscope.detection.sight import TWICE, Sight, Unseen
 from orthoscope.detection.smooth_grid import off_smooth_grid
-from orthoscope.geometry.arrays import Bool, Float, InputError, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, InputError, Int, median, ndarray
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.marked_chessboard import MarkedChessboard
 
@@ -54,6 +55,8 @@ SMALL_STEP = 12.0
 FEWEST_PART_CORNERS = 6
 # At least this share of the board's corners hangs together, or trying other finders is not worth while.
 ENOUGH_CORNERS_SHARE = 0.25
+# Of a second board that is wholly in the picture at least this share of the corners hangs together.
+SECOND_BOARD_SHARE = 0.5
 # More than this many times the board's corners are a tiled floor, not a board.
 TOO_MANY_RATIO = 1.5
 # Where one lattice has this many times the board's corners, whatever it is, no further copy is looked at.
@@ -70,6 +73,14 @@ LARGEST_USUAL_STRAY = 0.03
 RIM_PX = 2.0
 # A part with more than this share of corners that are no saddles is not believed.
 MOST_DOUBTFUL_SHARE = 0.4
+
+
+class _Laid(NamedTuple):
+    """A lattice laid on the board: ids (n,) in ascending order, pixels (n,2), and which of them are sure."""
+
+    ids: Int[ndarray, " n"]
+    pixels: Float[ndarray, "n 2"]
+    sure: Bool[ndarray, " n"]
 
 
 def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | Unseen:
@@ -90,7 +101,8 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             f"a board of {board.columns}x{board.rows} inner corners cannot be found in photographs; expected"
             " at least 3x3."
         )
-    parts, hanging, open_ = [], 0, False
+    parts: list[_Laid] = []
+    hanging, open_ = 0, False
     for found, copy, others in _hanging_together(grey):
         if len(found.pixels) > FLOOR_RATIO * board.columns * board.rows:
             break
@@ -102,18 +114,26 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         sight = _on_board(grey, grid, board)
         open_ |= sight is None
         if sight and len(sight.ids) == board.columns * board.rows:
-            alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in others)
-            return sight._replace(remark=TWICE) if alike else sight
+            large = (other for other in others if len(other.pixels) >= SECOND_BOARD_SHARE * len(sight.ids))
+            alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in large)
+            return _sure(sight, TWICE if alike else "")
         parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
-    best = max(parts, key=lambda sight: len(sight.ids), default=None)
+    best = max(parts, key=lambda sight: int(sight.sure.sum()), default=None)
     count = board.columns * board.rows
     if ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count and (
         best is None or len(best.ids) > 0.8 * count
     ):
         best = _by_opencv(grey, board) or best
     if best:
-        return best
+        return _sure(best)
     return Unseen("is in it in part only, and which part cannot be told" if open_ else "was not found in it")
+
+
+def _sure(laid: _Laid, remark: str = "") -> Sight | Unseen:
+    """The corners of a board that are sure."""
+    if laid.sure.sum() < FEWEST_PART_CORNERS:
+        return Unseen("is in it, but too blurred, dim or small to say where its corners are")
+    return Sight(laid.ids[laid.sure], laid.pixels[laid.sure], remark)
 
 
 def _in_photograph(
@@ -179,7 +199,7 @@ def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, l
                 yield one, copy, found[number:]
 
 
-def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> Sight | None:
+def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> _Laid | None:
     """The corners with their ids, refined; None where the grid is not the board's or the ids are open."""
     ways = placements(grid, board.columns, board.rows)
     arms = np.ones(grid.seen.shape)
@@ -192,9 +212,9 @@ def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -
     ids = _first_way(ways, grid.corners, whole)
     if isinstance(board, MarkedChessboard):
         arms[np.isin(ids, board.marked_corners())] = board.arm
-    pixels, good = _refined(grey, grid.corners, grid.seen, arms)
+    pixels, good, sure = _refined(grey, grid.corners, grid.seen, arms)
     order = np.argsort(ids[good])
-    return Sight(ids[good][order], pixels[good][order])
+    return _Laid(ids[good][order], pixels[good][order], sure[good][order])
 
 
 def _alike(ways: list[ndarray], seen: Bool[ndarray, "r c"], symmetries: tuple[ndarray, ...]) -> bool:
@@ -218,8 +238,8 @@ def _refined(
     corners: Float[ndarray, "r c 2"],
     seen: Bool[ndarray, "r c"],
     arms: Float[ndarray, "r c"],
-) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"]]:
-    """The grid's corners in the photograph, and which of them are good."""
+) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"], Bool[ndarray, "r c"]]:
+    """The grid's corners in the photograph, which of them are good, and which of these are sure."""
     inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(-1)
     row, column = np.nonzero(seen | inside)
     places = np.stack([column, row], axis=1).astype(float)
@@ -236,6 +256,7 @@ def _refined(
             np.where(off[:, None], again.pixels, fine.pixels),
             np.where(off, again.believed, fine.believed),
             np.where(off, again.explained, fine.explained),
+            np.where(off, again.sure, fine.sure),
         )
         off = _off(fine, places)
     fine, off = _on_smooth_grid(grey, fine, places, off, arms[row, column])
@@ -246,7 +267,9 @@ def _refined(
         good[:] = False
     pixels = corners.copy()
     pixels[row, column] = fine.pixels
-    return pixels, good
+    sure = np.zeros_like(seen)
+    sure[row, column] = fine.sure
+    return pixels, good, sure
 
 
 def _on_smooth_grid(
@@ -262,20 +285,21 @@ def _on_smooth_grid(
     on = np.flatnonzero(~off)
     if not len(on):
         return fine, off
-    step = float(np.median(nearest_neighbour(fine.pixels[on], places[on])))
-    poor = float(np.median(fine.explained[on])) < LEAST_EXPLAINED or step < SMALL_STEP
+    step = median(nearest_neighbour(fine.pixels[on], places[on]))
+    poor = median(fine.explained[on]) < LEAST_EXPLAINED or step < SMALL_STEP
     away, foreseen, limit = off_smooth_grid(
         fine.pixels[on], places[on], step, doubtful=~fine.believed[on], poor=poor
     )
     if not away.any():
         return fine, off
-    pixels, believed, off = fine.pixels.copy(), fine.believed.copy(), off.copy()
+    pixels, believed, sure, off = fine.pixels.copy(), fine.believed.copy(), fine.sure.copy(), off.copy()
     pixels[on[away]] = foreseen[away]
     again = refined(grey, pixels[on], places[on], approach=False, arm=arms[on])
     pixels[on[away]], believed[on[away]] = again.pixels[away], again.believed[away]
+    sure[on[away]] = again.sure[away]
     moved = np.hypot(*(again.pixels - foreseen).T)
     off[on[away]] = ((moved > limit) | ~again.believed)[away]
-    return Refined(pixels, believed, fine.explained), off
+    return Refined(pixels, believed, fine.explained, sure), off
 
 
 def _without_strays(
@@ -287,7 +311,7 @@ def _without_strays(
         on = np.flatnonzero(~off)
         if len(on) < FEWEST_PART_CORNERS:
             break
-        some = Refined(fine.pixels[on], fine.believed[on], fine.explained[on])
+        some = Refined(*(part[on] for part in fine))
         strays = _off(some, places[on])
         if not strays.any():
             break
@@ -299,7 +323,7 @@ def _without_strays(
 def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
     """Which corners are off their neighbours' lines by more than is usual, no saddles sooner."""
     stray = grid_shape(fine.pixels, places).stray
-    usual = min(float(np.median(stray)), LARGEST_USUAL_STRAY)
+    usual = min(median(stray), LARGEST_USUAL_STRAY)
     return stray > np.where(
         fine.believed,
         max(OFF_LIMITS[0], OFF_LIMITS[1] * usual),
@@ -307,7 +331,7 @@ def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
     )
 
 
-def _by_opencv(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | None:
+def _by_opencv(grey: ndarray, board: Chessboard | MarkedChessboard) -> _Laid | None:
     """What OpenCV's finders see, if it is the whole board."""
     for rough in opencv_boards(grey, board.columns, board.rows):
         corners = rough.reshape(board.rows, board.columns, 2)

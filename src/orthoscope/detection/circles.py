@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from orthoscope.detection.copies import resized, to_photograph
-from orthoscope.detection.disc_lattice import foreseen, laid_on, numbered
+from orthoscope.detection.disc_lattice import foreseen, laid_on, like_the_others, numbered
 from orthoscope.detection.disc_outlines import refined_discs, spots
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import Float, Int, ndarray
@@ -76,19 +76,24 @@ def _outlined(
     scale = grey.shape[1] / copy.shape[1]
     mine = ids >= 0
     rough = Ellipses(to_photograph(discs.centres[mine], copy, grey), discs.axes[mine] * scale)
-    known, fine = ids[mine], refined_discs(grey, rough)
+    known, (fine, roughness) = ids[mine], refined_discs(grey, rough)
+    unlike = known[:0]
     for _ in range(board.columns + board.rows):
         good = np.isfinite(fine.centres[:, 0])
-        known, fine = known[good], Ellipses(fine.centres[good], fine.axes[good])
+        known, fine, roughness = known[good], fine.of(good), roughness[good]
+        good = like_the_others(board, fine, known, roughness)
+        unlike = np.union1d(unlike, known[~good])
+        known, fine, roughness = known[good], fine.of(good), roughness[good]
         if len(known) < FEWEST_DISCS:
             break
         more, there = foreseen(board, fine, known, grey.shape)
-        added = refined_discs(grey, there)
+        added, rough_added = refined_discs(grey, there)
         off = np.linalg.norm(added.centres - there.centres, axis=1)
-        near = off < FARTHEST_RADII * np.sqrt(np.abs(np.linalg.det(there.axes)))
+        near = ~np.isin(more, unlike) & (off < FARTHEST_RADII * np.sqrt(np.abs(np.linalg.det(there.axes))))
         if not near.any():
             break
         known = np.concatenate([known, more[near]])
+        roughness = np.concatenate([roughness, rough_added[near]])
         fine = Ellipses(
             np.concatenate([fine.centres, added.centres[near]]), np.concatenate([fine.axes, added.axes[near]])
         )

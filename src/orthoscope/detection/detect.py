@@ -7,7 +7,6 @@ read, one of another size than most, one that shows the same picture as another,
 from __future__ import annotations
 
 import hashlib
-import os
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -25,6 +24,7 @@ from orthoscope.detection.together import see_members
 from orthoscope.files.images import MOST_MEGAPIXELS
 from orthoscope.files.pictures import Given, Picture, pictures
 from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.geometry.cores import at_once
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.detections import Detections, Remark, SetAside, View, view_name
 from orthoscope.targets.table import parse_target
@@ -80,7 +80,7 @@ def detect(
     given = pictures(photographs, topic=topic)
     names = [picture.name for picture in given]
     looks: list[_Look] = []
-    with nullcontext(executor) if executor else ThreadPoolExecutor(jobs or os.cpu_count()) as run:
+    with nullcontext(executor) if executor else ThreadPoolExecutor(at_once(jobs)) as run:
         asked = [_placed(picture) for picture in given]
         for look in run.map(_look, asked, [target] * len(given), [most_megapixels] * len(given)):
             looks.append(look)
@@ -96,7 +96,7 @@ def detect(
     ]
     if not views or size is None:
         raise CalibrationError(_nothing_found(given, looks, target, aside))
-    remarks += _if_another(given, looks, target, views)
+    remarks += [*_never_seen(looks, target), *_if_another(given, looks, target, views)]
     return Detections(target, size, tuple(views), tuple(aside), remarks=tuple(remarks))
 
 
@@ -179,6 +179,21 @@ def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, asi
         return f"{told} There seems to be {_instead(board, target.board, where)}."
     advice = target.board.advice if target.board else "See that it is whole, sharp and lit"
     return f"{told} {advice}:{reasons}"
+
+
+def _never_seen(looks: list[_Look], target: Target) -> list[Remark]:
+    """A remark on each of several targets that no photograph shows."""
+    count = sum(look.size is not None for look in looks)
+    never = [
+        member
+        for number, member in enumerate(target.members)
+        if not any(number in look.found for look in looks)
+    ]
+    told = f"was found in none of {count} photographs; expected in some of them."
+    return [
+        Remark(member.name, f"{told} {member.board.advice if member.board else 'See that it is there'}")
+        for member in never
+    ]
 
 
 def _board_instead(given: list[Picture], target: Chessboard) -> tuple[int, int] | None:

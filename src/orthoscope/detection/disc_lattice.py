@@ -15,11 +15,11 @@ from collections import deque
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.circles import Circles
 
-__all__ = ["foreseen", "laid_on", "numbered"]
+__all__ = ["foreseen", "laid_on", "like_the_others", "numbered"]
 
 # So many discs may be next to one.
 NEIGHBOUR_CANDIDATES = 12
@@ -39,8 +39,18 @@ RIVAL_SHARE = 0.5
 MOST_SPOTS_OFF_BOARD = 1
 # So many discs nearby foresee one.
 FORESEEING_DISCS = 12
+# With no more than so many discs nearby none is foreseen well enough to compare with.
+FEWEST_FORESEEING = 5
 # A disc is seen when it is in the picture with its radii multiplied by this.
 SEEN_MARGIN = 1.25
+
+# A disc's outline is at most so many times as rough as is usual, or this rough, radii.
+MOST_ROUGH, SMOOTH_RADII = 3.0, 0.03
+# A disc's radius is at most this share off what those near it foresee, or so many times the usual share.
+MOST_OFF_SIZE, TIMES_OFF_SIZE = 0.1, 5.0
+# A disc's centre is at most so many of its radii off from where those near it foresee it, or so many times as
+# far as is usual.
+MOST_OFF_PLACE, TIMES_OFF_PLACE = 0.15, 6.0
 
 
 def numbered(discs: Ellipses) -> tuple[Int[ndarray, " n"], Int[ndarray, "n 2"]]:
@@ -181,13 +191,47 @@ def foreseen(
     where, like = [], []
     for k in next_to:
         nearest = np.argsort(apart[k], kind="stable")[:FORESEEING_DISCS]
-        x, y = (places[known[nearest]] - places[missing[k]]).T.astype(float)
-        terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-        enough = len(nearest) >= FORESEEING_DISCS and min(len(np.unique(x)), len(np.unique(y))) >= 3
-        width = 6 if enough else 3
-        where.append(np.linalg.lstsq(terms[:, :width], centres[nearest], rcond=None)[0][0])
+        where.append(_foretelling(places[known[nearest]] - places[missing[k]]) @ centres[nearest])
         like.append(axes[nearest[0]])
     found = Ellipses(np.array(where).reshape(-1, 2), np.array(like).reshape(-1, 2, 2))
     reach = SEEN_MARGIN * np.linalg.norm(found.axes, axis=2)
     inside = ((found.centres - reach > 1) & (found.centres + reach < np.array(shape[1::-1]) - 2)).all(1)
     return missing[next_to][inside], Ellipses(found.centres[inside], found.axes[inside])
+
+
+def like_the_others(
+    board: Circles, discs: Ellipses, ids: Int[ndarray, " n"], roughness: Float[ndarray, " n"]
+) -> Bool[ndarray, " n"]:
+    """Which discs are as large, as smooth and where those near them foresee it; others are partly covered.
+
+    Args:
+        board: what was photographed.
+        discs: that were found.
+        ids: of these.
+        roughness: of their outlines, radii.
+    """
+    if not len(ids):
+        return np.zeros(0, dtype=bool)
+    places, radii = board.neighbour_places()[ids], np.sqrt(np.abs(np.linalg.det(discs.axes)))
+    good = roughness < max(MOST_ROUGH * median(roughness), SMOOTH_RADII)
+    known = np.column_stack([discs.centres, np.log(radii)])
+    off_place, off_size = np.zeros((2, len(ids)))
+    for number in range(len(ids)):
+        others = np.flatnonzero(good & (np.arange(len(ids)) != number))
+        apart = np.abs(places[others] - places[number]).sum(-1)
+        nearest = others[np.argsort(apart, kind="stable")[:FORESEEING_DISCS]]
+        if len(nearest) > FEWEST_FORESEEING:
+            weights = _foretelling(places[nearest] - places[number])
+            told, reach = weights @ known[nearest], max(1.0, float(np.linalg.norm(weights)))
+            off_place[number] = np.hypot(*(told - known[number])[:2]) / radii[number] / reach
+            off_size[number] = abs(told[2] - known[number, 2]) / reach
+    good &= off_place < max(MOST_OFF_PLACE, TIMES_OFF_PLACE * median(off_place))
+    return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
+
+
+def _foretelling(steps: Int[ndarray, "k 2"]) -> Float[ndarray, " k"]:
+    """By what weights discs so many steps away foretell here: by a parabola, few discs by a plane."""
+    x, y = steps.T.astype(float)
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+    enough = len(x) >= FORESEEING_DISCS and min(len(np.unique(x)), len(np.unique(y))) >= 3
+    return np.linalg.pinv(terms[:, : 6 if enough else 3])[0]

@@ -13,6 +13,7 @@ sides, so that the centre of the ellipse through it stays.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -20,7 +21,7 @@ import numpy as np
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.ellipses import Ellipses, fit_ellipses
 
-__all__ = ["refined_discs", "spots"]
+__all__ = ["Outlines", "refined_discs", "spots"]
 
 # Thresholds are taken over windows of these shares of the longer side.
 WINDOW_SHARES = (0.12, 0.04, 0.3)
@@ -113,8 +114,17 @@ def _covariances(labels: ndarray, fits: ndarray, middles: ndarray) -> Float[ndar
     return (np.stack(sums, axis=-1) / area[:, None]).reshape(-1, 2, 2) + np.eye(2) / 12.0
 
 
-def refined_discs(grey: ndarray, rough: Ellipses) -> Ellipses:
-    """Ellipses through the outlines of discs that are dark; NaN where there is no whole outline.
+class Outlines(NamedTuple):
+    """ellipses: through the outlines of n discs, NaN where there is no whole one.  roughness: (n,) rms of an
+    outline about its ellipse, in radii.
+    """
+
+    ellipses: Ellipses
+    roughness: Float[ndarray, " n"]
+
+
+def refined_discs(grey: ndarray, rough: Ellipses) -> Outlines:
+    """The outlines of discs that are dark.
 
     Args:
         grey: (h,w) uint8.
@@ -123,7 +133,7 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Ellipses:
     smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA)
     angle = 2.0 * np.pi * np.arange(RAY_COUNT) / RAY_COUNT
     rays = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    fitted = rough
+    fitted, roughness = rough, np.full(len(rough.centres), np.inf)
     for _ in range(REFINING_ROUNDS):
         known = np.isfinite(fitted.centres[:, 0])
         centres, axes = fitted.centres[known], fitted.axes[known]
@@ -138,13 +148,14 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Ellipses:
         )
         off = np.where(np.isfinite(radii), np.hypot(*places.swapaxes(0, 1)) - 1.0, np.nan)
         seen = np.isfinite(off).mean(1) >= LEAST_RAYS_SHARE
-        rough_px = np.sqrt(np.nanmean(np.where(seen[:, None], off, 1.0) ** 2, axis=1))
-        good = seen & (rough_px < MOST_ROUGHNESS)
+        off_radii = np.sqrt(np.nanmean(np.where(seen[:, None], off, 1.0) ** 2, axis=1))
+        good = seen & (off_radii < MOST_ROUGHNESS)
         new_centres, new_axes = np.full_like(fitted.centres, np.nan), np.full_like(fitted.axes, np.nan)
         which = np.flatnonzero(known)[good]
         new_centres[which], new_axes[which] = found.centres[good], found.axes[good]
+        roughness[which] = off_radii[good]
         fitted = Ellipses(new_centres, new_axes)
-    return fitted
+    return Outlines(fitted, roughness)
 
 
 def _outline(smooth: ndarray, centres: ndarray, arms: Float[ndarray, "n 2 k"]) -> Float[ndarray, "n k"]:

@@ -11,13 +11,14 @@ been mistaken for something else.
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["GridShape", "cross", "grid_shape", "lattice", "nearest_neighbour", "one_line_more"]
+__all__ = ["GridShape", "cross", "grid_shape", "lattice", "nearest_neighbour", "one_line_more", "steps_of"]
 
 # Through so many corners of a line the polynomial of this degree goes exactly.
 EXACT_FIT = (4, 3)
@@ -58,6 +59,21 @@ def grid_shape(corners: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) ->
     step = np.maximum(np.minimum(np.hypot(*along.T), np.hypot(*down.T)), 1e-9)
     stray = np.maximum(np.hypot(*(corners - on_row).T), np.hypot(*(corners - on_column).T)) / step
     return GridShape(along, down, _curvature(along, turn_along), _curvature(down, turn_down), stray)
+
+
+def steps_of(grid: Float[ndarray, "r c 2"]) -> tuple[Float[ndarray, "r c 2"], Float[ndarray, "r c 2"]]:
+    """One step along the row and along the column at each corner of a full grid, pixels; as `grid_shape`
+    gives them, sooner.
+    """
+    rows, columns = grid.shape[:2]
+    along, down = (_slopes(count) for count in (columns, rows))
+    return along @ grid, (down @ grid.reshape(rows, -1)).reshape(grid.shape)
+
+
+@cache
+def _slopes(count: int) -> Float[ndarray, "count count"]:
+    """From the points of a whole line to their first derivatives; those of a point alone are 0."""
+    return _polynomials(tuple(map(float, range(count))), *EXACT_FIT)[1]
 
 
 def nearest_neighbour(corners: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Float[ndarray, " m"]:
@@ -121,8 +137,9 @@ def _along_lines(
 def _lines(places: Float[ndarray, "m 2"], axis: int) -> list[ndarray]:
     """Indices of the corners of each row (axis 0) or column (axis 1), in order."""
     order = np.lexsort((places[:, axis], places[:, 1 - axis]))
-    ends = np.flatnonzero(np.diff(places[order, 1 - axis])) + 1
-    return np.split(order, ends)
+    line = places[order, 1 - axis]
+    ends = (np.flatnonzero(line[1:] != line[:-1]) + 1).tolist()
+    return [order[start:end] for start, end in pairwise([0, *ends, len(order)])]
 
 
 @cache

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from orthoscope.detection.marker_corners import crossings_of_sides
+from orthoscope.detection.marker_fit import fit_markers
 from orthoscope.detection.markers import Markers, find_markers, of_one_board, remark_on
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.targets.grid_board import GridBoard
-from orthoscope.targets.markers import modules_of
+from orthoscope.targets.markers import marker_modules, modules_of
 
 __all__ = ["see_grid_board"]
 
@@ -36,10 +36,12 @@ def see_grid_board(grey: ndarray, board: GridBoard) -> Sight | Unseen:
     rough = markers.corners[mine][first]
     if len(numbers) < min(2, len(plane)):
         return Unseen(f"was not found in it: {len(numbers)} of its {len(plane)} markers were")
-    fine, good = crossings_of_sides(grey, rough, modules_of(board.dictionary))
+    module = board.marker / modules_of(board.dictionary)
+    drawings = [marker_modules(board.dictionary, board.first + number) for number in numbers.tolist()]
+    fine, good = fit_markers(grey, rough, drawings, gap=board.gap / module)
     sides = np.linalg.norm(rough - np.roll(rough, 1, axis=1), axis=-1).min(1)
-    good &= np.linalg.norm(fine - rough, axis=-1).max(1) < np.maximum(FARTHEST_SHARE * sides, 1.5)
+    good &= np.linalg.norm(fine - rough, axis=-1) < np.maximum(FARTHEST_SHARE * sides, 1.5)[:, None]
     if not good.any():
         return Unseen(f"was not found in it: its {len(numbers)} markers have no sharp sides")
-    ids = (4 * numbers[good, None] + np.arange(4)).ravel()
-    return Sight(ids, fine[good].reshape(-1, 2), remark_on(markers, mine))
+    ids = 4 * numbers[:, None] + np.arange(4)
+    return Sight(ids[good], fine[good], remark_on(markers, mine))

@@ -9,6 +9,7 @@ links too, rarely many: noise and texture give lattices of a few corners.
 
 from __future__ import annotations
 
+from math import cos, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ __all__ = ["CornerLattice", "lattices"]
 NEIGHBOUR_CANDIDATES = 16
 # The edge is off the direction to the neighbour, and off the neighbour's edge, by less than this, radians.
 WIDEST_TURN = np.deg2rad(22.0)
+# A link is at most so many times as long as the next one of its line.
+LONGEST_STEP = 2.0
 # A lattice worth telling of has at least this many corners.
 FEWEST_LATTICE_CORNERS = 4
 
@@ -50,12 +53,13 @@ def lattices(points: SaddlePoints) -> list[CornerLattice]:
     """What hangs together, the most corners first."""
     if len(points.pixels) < FEWEST_LATTICE_CORNERS:
         return []
-    links = _mutual(_neighbours(points))
-    left = np.ones(len(links), dtype=bool)
+    links = _single_steps(_mutual(_neighbours(points)), points.pixels)
+    left, count = np.ones(len(links), dtype=bool), (links >= 0).sum(1)
+    listed, edges = links.tolist(), points.edges.tolist()
     found = []
-    for seed in np.argsort(-(links >= 0).sum(1), kind="stable"):
-        if left[seed] and (links[seed] >= 0).sum() >= 2:
-            members, cells = _spread(links, points.edges, int(seed), left)
+    for seed in np.argsort(-count, kind="stable").tolist():
+        if left[seed] and count[seed] >= 2:
+            members, cells = _spread(listed, edges, seed, left)
             left[members] = False
             if len(members) >= FEWEST_LATTICE_CORNERS:
                 found.append(_lattice(points, members, cells))
@@ -99,25 +103,31 @@ def _mutual(links: Int[ndarray, "n 4"]) -> Int[ndarray, "n 4"]:
     return np.where((links >= 0) & back, links, -1)
 
 
+def _single_steps(links: Int[ndarray, "n 4"], pixels: Float[ndarray, "n 2"]) -> Int[ndarray, "n 4"]:
+    """The links without those that leap over corners that are not seen, as behind a mark: they are much
+    longer than the next link of their line.
+    """
+    length = np.where(links >= 0, np.linalg.norm(pixels[links] - pixels[:, None], axis=-1), np.inf)
+    return _mutual(np.where(length > LONGEST_STEP * np.roll(length, 2, axis=1), -1, links))
+
+
 def _spread(
-    links: ndarray, edges: ndarray, seed: int, left: ndarray
+    links: list[list[int]], edges: list[list[float]], seed: int, left: ndarray
 ) -> tuple[Int[ndarray, " k"], Int[ndarray, "k 2"]]:
     """All that can be reached from a corner, with its cell; the seed's first edge is the direction of
     columns.
     """
-    along = {seed: float(edges[seed, 0])}  # the direction of columns at each corner, 0 to 2 pi
-    down = {seed: float(edges[seed, 1])}
+    along = {seed: edges[seed][0]}  # the direction of columns at each corner, 0 to 2 pi
+    down = {seed: edges[seed][1]}
     cell = {seed: (0, 0)}
     taken = {(0, 0): seed}
     queue = [seed]
     for here in queue:
-        for other, direction in zip(
-            links[here].tolist(), (*edges[here], *(edges[here] + np.pi)), strict=True
-        ):
+        for other, direction in zip(links[here], _both_ways(edges[here]), strict=True):
             if other < 0 or not left[other] or other in cell:
                 continue
-            a, d = np.cos(direction - along[here]), np.cos(direction - down[here])
-            step = (int(np.sign(a)), 0) if abs(a) > abs(d) else (0, int(np.sign(d)))
+            a, d = cos(direction - along[here]), cos(direction - down[here])
+            step = (1 if a > 0 else -1, 0) if abs(a) > abs(d) else (0, 1 if d > 0 else -1)
             place = (cell[here][0] + step[0], cell[here][1] + step[1])
             if place in taken:
                 continue
@@ -129,10 +139,18 @@ def _spread(
     return members, np.array([cell[i] for i in queue])
 
 
-def _nearest_direction(edges: ndarray, wanted: float) -> float:
+def _nearest_direction(edges: list[float], wanted: float) -> float:
     """The direction along one of the edges, either way, nearest to the wanted one."""
-    ways = np.concatenate([edges, edges + np.pi])
-    return float(ways[np.cos(ways - wanted).argmax()])
+    first, second = edges
+    one, other = cos(first - wanted), cos(second - wanted)
+    way, towards = (first, one) if abs(one) >= abs(other) else (second, other)
+    return way if towards > 0 else way + pi
+
+
+def _both_ways(edges: list[float]) -> tuple[float, float, float, float]:
+    """The directions along both edges, and back along both."""
+    first, second = edges
+    return first, second, first + pi, second + pi
 
 
 def _lattice(points: SaddlePoints, members: ndarray, cells: ndarray) -> CornerLattice:

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.detection.grid import grid_shape, lattice, one_line_more
+from orthoscope.detection.grid import grid_shape, one_line_more, steps_of
 from orthoscope.detection.lattices import CornerLattice
-from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 
 __all__ = [
     "Grid",
@@ -60,6 +60,18 @@ SHAPING_LINES = 2
 MOST_UNEVENNESS = 0.45
 # A line is compared with so many lines before it.
 COMPARED_LINES = 4
+# In the four squares around a corner the grey is looked at so far from their sides, squares.
+STEPS_INTO_SQUARE = (0.15, 0.25, 0.35)
+# Weights (3, 36) of the corner, its step along the row and its step along the column: nine places in each of
+# the four squares, those of one colour first.
+PLACES_IN_SQUARES = np.array(
+    [
+        (1.0, across * step, up * other)
+        for across, up in ((1, 1), (-1, -1), (1, -1), (-1, 1))
+        for step in STEPS_INTO_SQUARE
+        for other in STEPS_INTO_SQUARE
+    ]
+).T
 
 
 class Grid(NamedTuple):
@@ -156,7 +168,7 @@ def filled(grid: Float[ndarray, "r c 2"], *, rounds: int = 1000) -> Float[ndarra
     for _ in range(rounds):
         if not np.isnan(grid[..., 0]).any():
             break
-        told = np.stack([part for turn in range(4) for part in _foreseen(grid, turn)])
+        told = _foreseen(grid)
         known = np.isfinite(told[..., 0])
         count = known.sum(0)
         new = np.isnan(grid[..., 0]) & (count > 0)
@@ -167,14 +179,24 @@ def filled(grid: Float[ndarray, "r c 2"], *, rounds: int = 1000) -> Float[ndarra
     return grid
 
 
-def _foreseen(grid: ndarray, turn: int) -> list[ndarray]:
-    """Each place from the two before it on its line, the two beside it, and three of a parallelogram."""
-    turned = np.rot90(grid, turn)
-    straight, slanted, between = (np.full_like(turned, np.nan) for _ in range(3))
-    between[:, 1:-1] = 0.5 * (turned[:, 2:] + turned[:, :-2])
-    straight[:, 2:] = 2.0 * turned[:, 1:-1] - turned[:, :-2]
-    slanted[1:, 1:] = turned[1:, :-1] + turned[:-1, 1:] - turned[:-1, :-1]
-    return [np.rot90(part, -turn) for part in (straight, slanted, between)]
+def _foreseen(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "12 r c 2"]:
+    """Each place from the two before it on its line, the two beside it, and three of a parallelogram, from
+    all four sides.
+    """
+    rows, columns = grid.shape[:2]
+    around = np.full((rows + 4, columns + 4, 2), np.nan)
+    around[2:-2, 2:-2] = grid
+
+    def at(down: int, along: int) -> ndarray:
+        return around[2 + down : 2 + down + rows, 2 + along : 2 + along + columns]
+
+    told = np.empty((12, *grid.shape))
+    for i, (down, along) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+        beside = (along, -down)
+        told[i] = 2.0 * at(down, along) - at(2 * down, 2 * along)
+        told[4 + i] = at(down, along) + at(*beside) - at(down + beside[0], along + beside[1])
+        told[8 + i] = 0.5 * (at(down, along) + at(-down, -along))
+    return told
 
 
 def _without_strays(found: CornerLattice) -> CornerLattice | None:
@@ -195,7 +217,7 @@ def _without_strays(found: CornerLattice) -> CornerLattice | None:
 def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:
     """Where the squares around a corner are bright and dark as they must be there, with contrast enough."""
     strength = alternating(grey, grid) * (1.0 if bright else -1.0)
-    usual = np.median(strength[strength > 0]) if (strength > 0).any() else np.inf
+    usual = median(strength[strength > 0]) if (strength > 0).any() else np.inf
     return strength > LEAST_CONTRAST_SHARE * usual
 
 
@@ -245,8 +267,8 @@ def _taken_further(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool, mo
 def is_even(grey: ndarray, grid: Grid) -> bool:
     """Whether a grid's corners are about as strong as each other; those of texture are not."""
     strength = alternating(grey, grid.corners)[grid.seen] * (1.0 if grid.bright else -1.0)
-    usual = float(np.median(strength)) if len(strength) else 0.0
-    return usual > 0 and float(np.median(np.abs(strength - usual))) < MOST_UNEVENNESS * usual
+    usual = median(strength) if len(strength) else 0.0
+    return usual > 0 and median(np.abs(strength - usual)) < MOST_UNEVENNESS * usual
 
 
 def has_plain_squares(grey: ndarray, grid: Grid) -> bool:
@@ -280,7 +302,7 @@ def _next_line_stands(grey: ndarray, more: ndarray, bright: bool) -> ndarray:
     first = max(0, len(more) - 1 - COMPARED_LINES - SHAPING_LINES) // 2 * 2  # even, for the signs
     strength = alternating(grey, more[first:])[-1 - COMPARED_LINES :] * (1.0 if bright else -1.0)
     before = strength[:-1]
-    usual = np.median(before[before > 0]) if (before > 0).any() else np.inf
+    usual = median(before[before > 0]) if (before > 0).any() else np.inf
     return strength[-1] > 0.5 * usual
 
 
@@ -302,7 +324,7 @@ def _ends(grey: ndarray, grid: ndarray) -> bool:
     contrast = 0.25 * np.abs(near - before)
     dark = near < before
     same = np.abs(far - near) < 2.0 * contrast
-    alternates = np.abs(near - before) > 0.5 * np.median(np.abs(near - before))
+    alternates = np.abs(near - before) > 0.5 * median(np.abs(near - before))
     paper = beyond > level  # behind the bright ones too: where the board goes on, there are dark squares
     if dark.all() or not dark.any():
         return False
@@ -332,19 +354,13 @@ def strengths(grey: ndarray, grid: ndarray) -> Float[ndarray, "r c"]:
     picture.
     """
     rows, columns = grid.shape[:2]
-    corners = grid.reshape(-1, 2)
-    shape = grid_shape(corners, lattice(columns, rows))
-    steps = np.array([0.15, 0.25, 0.35])  # squares from the corner
-    along = np.array([1, -1, 1, -1])[:, None, None] * steps[:, None]
-    down = np.array([1, -1, -1, 1])[:, None, None] * steps
-    a, d = (part.reshape(1, 4, -1, 1) for part in np.broadcast_arrays(along, down))
-    places = (
-        corners[:, None, None] + a * shape.along[:, None, None] + d * shape.down[:, None, None]
-    )  # (m, 4 squares, 9, 2)
+    along, down = steps_of(grid)
+    at = np.stack([grid, along, down]).reshape(3, -1, 2).transpose(2, 1, 0) @ PLACES_IN_SQUARES  # (2, m, 36)
     height, width = grey.shape
-    x, y = np.rint(np.clip(places, -9e5, 9e5)).astype(int).transpose(3, 0, 1, 2)
-    inside = ((x >= 0) & (x < width) & (y >= 0) & (y < height)).all((1, 2))
-    squares = grey[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)].mean(-1)  # (m, 4)
-    bright = squares[:, :2].min(1) - squares[:, 2:].max(1)
-    dark = squares[:, 2:].min(1) - squares[:, :2].max(1)
+    x, y = np.rint(np.clip(at, -9e5, 9e5)).astype(int)
+    inside = ((x >= 0) & (x < width) & (y >= 0) & (y < height)).all(1)
+    seen = grey.ravel().take(y * width + x, mode="clip")
+    one, two, three, four = seen.reshape(len(seen), 4, -1).mean(-1).T  # the first two are of one colour
+    bright = np.minimum(one, two) - np.maximum(three, four)
+    dark = np.minimum(three, four) - np.maximum(one, two)
     return np.where(inside, np.maximum(bright, 0.0) - np.maximum(dark, 0.0), 0.0).reshape(rows, columns)

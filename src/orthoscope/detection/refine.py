@@ -17,8 +17,9 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.grid import GridShape, grid_shape, nearest_neighbour
-from orthoscope.detection.saddle import fit_saddles
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.detection.noise import noise_variance
+from orthoscope.detection.saddle import Saddles, fit_saddles
+from orthoscope.geometry.arrays import Bool, Float, distinct, median, ndarray
 
 __all__ = ["Refined", "refined"]
 
@@ -40,22 +41,36 @@ NOISE_LEFT_SHARE = 0.41
 SADDLE_MEAN_SQUARE = 0.6
 # A fit that ends farther from its start than this share of a square is not believed.
 FARTHEST_SHARE = 0.35
+# Of a sure corner the standard deviation is less than this, pixels: it is within a pixel then, as good as
+# always.
+WIDEST_SPREAD = 0.22
+# The edges of a sure corner are off the lattice's lines by less than this, radians.
+WIDEST_TURN = 0.4
+# A sure corner has more than this share of the usual contrast.
+LEAST_CONTRAST_SHARE = 0.35
+# Of a sure corner's window the saddle leaves at most so much more than of most, as a share of its variance
+# and, with that, of the share that is noise.
+MOST_UNEXPLAINED, MOST_UNEXPLAINED_NOISE = 0.03, 0.3
+# A mark on one side of a sure corner is farther from its edges than so many of the fitted blurs.
+CLEAR_BLURS = 2.0
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
 LEAST_SADDLE_SHARE = 0.85
 
 
-# So many pixels, evenly picked, tell the noise.
-NOISE_PIXELS = 10_000
-
-
 class Refined(NamedTuple):
-    """pixels: (m,2) of the corners.  believed: (m,) whether a saddle was fitted; else cornerSubPix had the
-    last word.  explained: (m,) share of its window's variance that the saddle explains.
+    """Corners, (m,) of each.
+
+    Attributes:
+        pixels: (m,2).
+        believed: whether a saddle was fitted; else cornerSubPix had the last word.
+        explained: share of its window's variance that the saddle explains.
+        sure: whether the saddle says to well within a pixel where the corner is, and is like the others'.
     """
 
     pixels: Float[ndarray, "m 2"]
     believed: Bool[ndarray, " m"]
     explained: Float[ndarray, " m"]
+    sure: Bool[ndarray, " m"]
 
 
 def refined(
@@ -72,11 +87,12 @@ def refined(
         grey: (h,w) uint8.
         rough: (m,2) pixels.
         places: (m,2) column and row of each in the lattice, in steps.
-        arm: how far from the edges something else than squares is printed, in steps; of all or of each.
+        arm: how far from the edges something else than squares is printed, in steps; of all, where it is on
+            opposite sides, or of each.
         approach: whether cornerSubPix comes near first; not where it went astray before.
     """
     square = nearest_neighbour(rough, places)
-    shrink = max(1, round(float(np.median(square)) / USUAL_SQUARE))
+    shrink = max(1, round(median(square) / USUAL_SQUARE))
     first, part = _surroundings(grey, rough, square.max())
     small = _reduced(part, shrink)
     near = (rough - first + 0.5) / shrink - 0.5
@@ -92,10 +108,37 @@ def refined(
     )
     allowed = np.maximum(FARTHEST_SHARE * nearest_neighbour(near, places), 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
-    least = LEAST_SADDLE_SHARE * signal / np.maximum(signal + _noise(small) * NOISE_LEFT_SHARE, 1e-9)
+    noise = NOISE_LEFT_SHARE * noise_variance(small)
+    noise_share = noise / np.maximum(signal + noise, 1e-9)
+    least = LEAST_SADDLE_SHARE * (1.0 - noise_share)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
-    return Refined(pixels, believed, saddles.explained)
+    sure = believed & (saddles.spread * shrink < WIDEST_SPREAD)
+    sure &= _are_alike(saddles, grid_shape(saddles.places, places), noise_share)
+    sure &= _are_clear(saddles, near, places, arm)
+    return Refined(pixels, believed, saddles.explained, sure)
+
+
+def _are_alike(saddles: Saddles, shape: GridShape, noise_share: Float[ndarray, " m"]) -> Bool[ndarray, " m"]:
+    """Which saddles have edges along the lattice's lines, about as much contrast as most, and are as true to
+    the picture as most: where something covers a part of a window, it is explained less.
+    """
+    lines = np.stack([shape.along, shape.down], axis=1)
+    turn = saddles.angles - np.arctan2(lines[..., 1], lines[..., 0])
+    off = np.abs((turn + 0.5 * np.pi) % np.pi - 0.5 * np.pi).max(1)
+    contrast = np.abs(saddles.contrast)
+    left = 1.0 - saddles.explained - noise_share
+    true = left - median(left) < MOST_UNEXPLAINED + MOST_UNEXPLAINED_NOISE * noise_share
+    return true & (off < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * median(contrast))
+
+
+def _are_clear(
+    saddles: Saddles, near: Float[ndarray, "m 2"], places: ndarray, arm: float | Float[ndarray, " m"]
+) -> Bool[ndarray, " m"]:
+    """Which saddles have no blurred mark beside them: what is printed on one side only draws them there."""
+    if isinstance(arm, float):
+        return np.ones(len(near), dtype=bool)
+    return (arm >= 1.0) | (arm * nearest_neighbour(near, places) > CLEAR_BLURS * saddles.blur)
 
 
 def _surroundings(
@@ -117,19 +160,12 @@ def _reduced(grey: ndarray, shrink: int) -> ndarray:
     )
 
 
-def _noise(grey: ndarray) -> float:
-    """The variance of a picture's noise, from what differs from pixel to pixel in its even parts."""
-    rough = cv2.filter2D(grey, cv2.CV_32F, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32))
-    rough = rough.ravel()[:: max(1, rough.size // NOISE_PIXELS)]
-    return float((np.median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)
-
-
 def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
     """cornerSubPix with a window that suits each corner's own squares."""
     radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, places)), 2, LARGEST_REACH).astype(int)
     places = np.clip(corners, 0, np.array(grey.shape[::-1]) - 1).astype(np.float32)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-2)
-    for size in np.unique(radius):
+    for size in distinct(radius):
         which = radius == size
         some = np.ascontiguousarray(places[which]).reshape(-1, 1, 2)
         places[which] = cv2.cornerSubPix(grey, some, (int(size), int(size)), (-1, -1), criteria).reshape(

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.detection.saddle_windows import COLUMN_COUNT, Shapes, Windows
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, median, ndarray
 
 __all__ = ["Saddles", "fit_saddles"]
 
@@ -50,18 +50,31 @@ LEAST_BLUR_PX = 0.75
 LARGEST_STEP = np.array([1.0, 1.0, 0.2, 0.2, 0.5])
 # Each column's own square is raised by this share of it; light changes little in a window.
 DAMPING = np.array([1e-3] * 5 + [1e-6] * 2 + [0.03] * 2)
+# Light makes a window's side usually brighter than its middle by this share of the contrast; where noise is
+# strong, more than that is taken for noise.
+USUAL_LIGHT = 0.02
 # So many pixels of all windows are done together, so that the arrays stay in cache.
 PIXELS_AT_ONCE = 60_000
 
 
 class Saddles(NamedTuple):
-    """places: (n,2) pixels. contrast: (n,) C, grey levels. explained: (n,) share of the window's variance
-    that the saddle explains.
+    """What was fitted.
+
+    Attributes:
+        places: (n,2) pixels.
+        angles: (n,2) of the two edges, radians.
+        blur: (n,) w, pixels.
+        contrast: (n,) C, grey levels.
+        explained: (n,) share of the window's variance that the saddle explains.
+        spread: (n,) standard deviation of a place in its worst direction, pixels, by what is not explained.
     """
 
     places: Float[ndarray, "n 2"]
+    angles: Float[ndarray, "n 2"]
+    blur: Float[ndarray, " n"]
     contrast: Float[ndarray, " n"]
     explained: Float[ndarray, " n"]
+    spread: Float[ndarray, " n"]
 
 
 def fit_saddles(
@@ -88,7 +101,8 @@ def fit_saddles(
     fit.begin_with_one_blur()
     for share, still in STAGES:
         fit.settle(fit.by_size, share, still)
-    return Saddles(fit.shapes.places, fit.contrast, fit.explained)
+    shapes = fit.shapes
+    return Saddles(shapes.places, shapes.angles, shapes.blur, fit.contrast, fit.explained, fit.spread())
 
 
 class _Fit:
@@ -102,6 +116,9 @@ class _Fit:
         angles = np.stack([np.arctan2(along[:, 1], along[:, 0]), np.arctan2(down[:, 1], down[:, 0])], axis=1)
         self.shapes = Shapes(start.astype(float), angles, np.ones(len(start)), bends, np.zeros(len(start)))
         self.contrast, self.explained = np.zeros((2, len(start)))
+        self.sums = np.zeros((len(start), COLUMN_COUNT + 1, COLUMN_COUNT + 1))
+        self.noise = np.zeros(len(start))
+        self.half = np.sqrt(np.maximum((along**2).sum(1), (down**2).sum(1)))
         self.area = 4.0 * np.abs(along[:, 0] * down[:, 1] - along[:, 1] * down[:, 0])
         self.by_size = np.argsort(self.area, kind="stable")
 
@@ -109,7 +126,7 @@ class _Fit:
         """The middle one of a few corners' blurs, for all."""
         few = self.by_size[:: max(1, len(self.by_size) // BLUR_CORNERS)]
         self.settle(few, *STAGES[0])
-        self.shapes.blur[:] = np.median(self.shapes.blur[few])
+        self.shapes.blur[:] = median(self.shapes.blur[few])
 
     def settle(self, which: ndarray, share: float, still: float) -> None:
         """Steps in a share of the window until each corner has moved by less than `still` px, or has had its
@@ -141,7 +158,8 @@ class _Fit:
     ) -> Float[ndarray, " n"]:
         """One step of these corners; how far each moved, px."""
         shapes = self.shapes
-        solution, self.explained[here] = _solved(sums)
+        self.sums[here] = sums
+        solution, self.explained[here], self.noise[here] = _solved(sums, self._damping(here, sums))
         contrast = self.contrast[here] = solution[:, 5]
         step = _in_pixels(
             solution[:, :5] / np.where(np.abs(contrast) < 1e-9, 1e-9, contrast)[:, None], shapes.of(here)
@@ -153,16 +171,41 @@ class _Fit:
         shapes.relief[here] = np.clip(contrast / np.maximum(level + solution[:, 6], 1.0), -1.0, 1.0)
         return np.abs(step[:, :2]).max(1)
 
+    def _damping(self, here: ndarray, sums: Float[ndarray, "n 10 10"]) -> Float[ndarray, "n 9"]:
+        """What is added to the diagonal of the sums: of the light, what noise makes of a window is not
+        believed to be light beyond `USUAL_LIGHT`.
+        """
+        damping = DAMPING * np.einsum("npp->np", sums[:, :-1, :-1]) + 1e-6
+        light = USUAL_LIGHT * np.abs(self.contrast[here]) / self.half[here]
+        damping[:, 7:] += (self.noise[here] / np.maximum(light**2, 1e-9))[:, None]
+        return damping
 
-def _solved(sums: Float[ndarray, "n 10 10"]) -> tuple[Float[ndarray, "n 9"], Float[ndarray, " n"]]:
-    """The damped least squares solution in each window, and the share of its variance that this explains."""
+    def spread(self) -> Float[ndarray, " n"]:
+        """The standard deviation of each corner in its worst direction, pixels, from the last step's sums."""
+        every = np.arange(len(self.contrast))
+        damped = self.sums[:, :-1, :-1] + np.eye(COLUMN_COUNT) * self._damping(every, self.sums)[:, None]
+        scale = self.noise / np.maximum(self.contrast**2, 1e-9)
+        of_columns = np.linalg.inv(damped)[:, :2, :2] * scale[:, None, None]
+        blur, bends = np.maximum(self.shapes.blur, median(self.shapes.blur)), self.shapes.bends
+        shapes = Shapes(self.shapes.places, self.shapes.angles, blur, bends, self.shapes.relief)
+        units = np.broadcast_to(np.eye(5)[:2], (len(blur), 2, 5))
+        turned = np.stack([_in_pixels(units[:, i], shapes)[:, :2] for i in (0, 1)], axis=2)
+        variances = np.linalg.eigvalsh(turned @ of_columns @ turned.transpose(0, 2, 1))
+        return np.sqrt(np.maximum(variances[:, -1], 0.0))
+
+
+def _solved(
+    sums: Float[ndarray, "n 10 10"], damping: Float[ndarray, "n 9"]
+) -> tuple[Float[ndarray, "n 9"], Float[ndarray, " n"], Float[ndarray, " n"]]:
+    """The damped least squares solution in each window, the share of its variance that this explains, and
+    the variance that it leaves.
+    """
     normal, right, square = sums[:, :-1, :-1], sums[:, :-1, -1], sums[:, -1, -1]
-    diagonal = np.einsum("npp->np", normal)
-    damped = normal + np.eye(COLUMN_COUNT) * (DAMPING * diagonal + 1e-6)[:, None]
-    solution = np.linalg.solve(damped, right[:, :, None])[:, :, 0]
+    solution = np.linalg.solve(normal + np.eye(COLUMN_COUNT) * damping[:, None], right[:, :, None])[:, :, 0]
     left = square - (solution * (2.0 * right - (normal @ solution[:, :, None])[:, :, 0])).sum(1)
-    variance = square - right[:, 6] ** 2 / np.maximum(diagonal[:, 6], 1e-9)
-    return solution, 1.0 - left / np.maximum(variance, 1e-9)
+    weight = np.maximum(normal[:, 6, 6], 1e-9)
+    variance = square - right[:, 6] ** 2 / weight
+    return solution, 1.0 - left / np.maximum(variance, 1e-9), left / np.maximum(weight, 1.0)
 
 
 def _in_pixels(column_steps: Float[ndarray, "n 5"], shapes: Shapes) -> Float[ndarray, "n 5"]:

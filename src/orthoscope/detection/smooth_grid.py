@@ -12,7 +12,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, median, ndarray
 
 __all__ = ["off_smooth_grid"]
 
@@ -71,7 +71,7 @@ def off_smooth_grid(
             return none
         foreseen = np.where(off[:, None], fitted, pixels + (fitted - pixels) / (1.0 - weight)[:, None])
         residual = np.hypot(*(foreseen - pixels).T)
-        usual = float(np.median(residual[~off]))
+        usual = median(residual[~off])
         limit = max((TIMES_NOISE if poor else TIMES_USUAL) * usual, LEAST_PX, LEAST_STEP_SHARE * step)
         limit = min(limit, max(MOST_PX, MOST_STEP_SHARE * step)) if poor else limit
         surely = limit if poor else max(limit, SURE_STEP_SHARE * step)

@@ -13,9 +13,10 @@ chance makes of it:
 
     bias^2 = max(0, |G (c - rich)|^2 - jackknife of the difference).
 
+Where photographs do not agree on one camera, the spread of their cameras is added to E^2, everywhere alike.
 Headline figures are root mean squares over places: the *seen part*, at corners that were detected, and the
-whole *frame*.  The region where the camera may be used is grown from the middle of the seen part as far as E
-stays below a limit. C. Hagemann, J. Knorr, H. Janssen and C. Stiller, Inferring bias and uncertainty in
+whole *frame*.  The region where the camera may be used (region.py) is as far as E stays below a limit between
+corners. C. Hagemann, J. Knorr, H. Janssen and C. Stiller, Inferring bias and uncertainty in
 camera calibration, IJCV 2022, and mrcal's documentation predict the like from corner noise alone.
 """
 
@@ -26,10 +27,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.evaluation.region import (
+    REGION_DIRECTIONS,
+    REGION_STEPS,
+    between,
+    grown,
+    inside,
+    ways_from,
+)
 from orthoscope.evaluation.verdict.situation import FINE_PX
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.scatter import Scatter
-from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, evenly, median, ndarray
 from orthoscope.models.camera import Camera
 
 __all__ = ["CameraError", "picked", "predicted_error", "rms_difference", "seen_places"]
@@ -42,10 +51,10 @@ ALIKE_DRAWS = 1.0
 MAP_COLUMNS = 28
 # The map has so many rows.
 MAP_ROWS = 21
-# The region is grown in so many directions.
-REGION_DIRECTIONS = 48
-# The region is grown in so many steps.
-REGION_STEPS = 20
+# Areas are counted by so many parts of each cell along both sides.
+CELL_PARTS = 5
+# A camera that is nearer to a fit of which all is known than this share of the error is that fit's.
+AS_GOOD_SHARE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +67,15 @@ class CameraError:
             at its own distance, since a shift of the camera undoes less where distances differ; over the
             frame at the typical one.
         model_px, alike_px, views_px, bias_px: over the seen part, far away, what makes it up: independent
-            errors of corners with the priors' scatter; these with errors alike within a view; the jackknife
-            over views with the priors' scatter; what a poorer model misses.
+            errors of corners alone; these with errors alike within a view and the priors' scatter; the
+            jackknife over views with the priors' scatter; what a poorer model misses.
         distance: of the target, metres, in the typical view.
         far, near: (rows, columns) over the frame, row by row, at the cells' centres; NaN where the camera has
             no image.
         limit_px: where the error is larger the camera is not called good; the limit of the grades.
         region: (n,2) pixels, the polygon of the places where it is smaller and corners were seen around.
+        share: of the frame, where the camera has an image, that lies in the region.
+        seen_share: of it that lies between corners that were seen, however large the error.
         without_px: (m,) of each photograph, by how much the image over the seen part moves without it; NaN
             where the others cannot tell.
     """
@@ -82,11 +93,13 @@ class CameraError:
     near: Float[ndarray, "rows columns"]
     limit_px: float
     region: Float[ndarray, "n 2"]
+    share: float
+    seen_share: float
     without_px: Float[ndarray, " m"]
 
     def trusted(self, pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
         """Which places of the image lie in the region where the camera may be used."""
-        return _inside(self.region, np.asarray(pixels, dtype=float))
+        return inside(self.region, np.asarray(pixels, dtype=float))
 
 
 class _Parts(NamedTuple):
@@ -99,6 +112,14 @@ class _Parts(NamedTuple):
     bias: float
 
 
+class _Given(NamedTuple):
+    """What is known of a calibration beside how its fit scatters: as `predicted_error` has it."""
+
+    copies: float
+    judged: Camera | None
+    differ_px: float
+
+
 class _Variances:
     """E^2 and its parts at places along unit rays, a motion fitted out over the first of them."""
 
@@ -106,13 +127,17 @@ class _Variances:
         self,
         scatter: Scatter,
         rich: Scatter | None,
+        poorer: Scatter,
         rays: Float[ndarray, "n 3"],
         fitted: int,
         distance: float,
+        given: _Given,
     ) -> None:
         # rays may have lengths of their own: places along them, in units of the distance
         slopes = _settled(scatter, rays, fitted, distance)
-        self.model, self.alike = _spread(slopes, scatter.model), _spread(slopes, scatter.alike)
+        self.fitted = fitted
+        self.model, self.alike = _spread(slopes[:fitted], scatter.repeated), _spread(slopes, scatter.alike)
+        self.alike *= given.copies
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
         self.moved = (by_view**2).sum(1)  # (n, m)
         self.views = np.nansum(self.moved, axis=1) + _spread(slopes, scatter.prior)
@@ -124,23 +149,44 @@ class _Variances:
             if not scatter.stretch.any():  # a target that is taken for flat hides a stretch as well
                 hidden = _spread(of_rich, rich.stretch)
                 self.alike, self.views = self.alike + hidden, self.views + hidden
-            apart = difference_of_images(rich.camera, scatter.camera, rays, rays[:fitted], distance=distance)
+            apart = difference_of_images(rich.camera, poorer.camera, rays, rays[:fitted], distance=distance)
+            if poorer is not scatter:
+                by_view = _settled(poorer, rays, fitted, distance) @ poorer.left_out.T
             both = by_view - of_rich @ rich.left_out.T
             by_chance = np.nansum(both**2, axis=(1, 2))
             self.apart, self.by_chance = np.nan_to_num((apart**2).sum(1)), by_chance
             self.bias = np.maximum(self.apart - by_chance, 0.0)
+        self.off = np.zeros(len(rays))
+        if given.judged is not None:
+            off = difference_of_images(scatter.camera, given.judged, rays, rays[:fitted], distance=distance)
+            self.off = np.nan_to_num((off**2).sum(1))
+            if np.mean(self.off[:fitted]) < AS_GOOD_SHARE**2 * np.nanmean(self.total[:fitted]):
+                self.off[:] = 0.0
+        self.off += given.differ_px**2
 
     @property
     def total(self) -> Float[ndarray, " n"]:
-        return np.maximum(self.alike, self.views) + self.bias
+        return np.maximum(self.alike, self.views) + self.bias + self.off
 
-    def over(self, some: slice) -> _Parts:
-        """Root mean squares over some places; the bias is what is left of it in the mean."""
-        model, alike, views = (float(np.nanmean(part[some])) for part in (self.model, self.alike, self.views))
+    def over(self, some: slice) -> float:
+        """The root mean square of the error over some places; the bias is what is left of it in the mean."""
+        alike, views, bias = self._means(some)
+        return float(np.sqrt(max(alike, views) + bias))
+
+    @property
+    def parts(self) -> _Parts:
+        """Root mean squares over the places that the motion was fitted to."""
+        alike, views, bias = self._means(slice(self.fitted))
+        squares = [max(alike, views) + bias, float(np.nanmean(self.model)), alike, views, bias]
+        return _Parts(*np.sqrt(squares).tolist())
+
+    def _means(self, some: slice) -> tuple[float, float, float]:
+        """Of both variances and of the squared bias, over some places."""
         bias = 0.0
         if self.bias.any():
             bias = max(float(np.nanmean(self.apart[some] - self.by_chance[some])), 0.0)
-        return _Parts(*np.sqrt([max(alike, views) + bias, model, alike, views, bias]).tolist())
+        bias += float(np.mean(self.off[some]))
+        return float(np.nanmean(self.alike[some])), float(np.nanmean(self.views[some])), bias
 
 
 def predicted_error(
@@ -149,6 +195,11 @@ def predicted_error(
     *,
     distance: float | Float[ndarray, " s"],
     richest: Scatter | None = None,
+    poorer: Scatter | None = None,
+    judged: Camera | None = None,
+    corners: Float[ndarray, "n 2"] | None = None,
+    copies: float = 1.0,
+    differ_px: float = 0.0,
 ) -> CameraError:
     """The error that is to be expected of a camera.
 
@@ -156,7 +207,15 @@ def predicted_error(
         scatter: of the camera.
         seen: pixels where corners were detected (`seen_places`).
         distance: of the corner that was seen there, metres; one for all where that will do.
-        richest: scatter of the richest model of the same photographs; None where it is this one.
+        richest: scatter of the richest model of the same photographs, or of some of them; None where it is
+            this one.
+        poorer: scatter of the camera's own model of the photographs of the richest, where these are some.
+        judged: the camera, where the scatter is that of another fit: how far it is from that one's counts as
+            bias.
+        corners: all that were detected, for the region to lie between; by default those of `seen`.
+        copies: photographs for each that is no near-copy of another: what is said of errors within a view
+            counted every one of them, though copies share their errors.
+        differ_px: by how much the photographs' own cameras differ, rms.
     """
     camera = scatter.camera
     width, height = camera.image_size
@@ -164,22 +223,25 @@ def predicted_error(
     rays, each = camera.unproject(seen), np.broadcast_to(np.asarray(distance, dtype=float), len(seen))
     known = np.isfinite(rays[:, 0])
     seen, rays, each = seen[known], rays[known], each[known]
-    typical = float(np.median(each))
-    middle = np.median(seen, axis=0)
-    ways = _ways(middle, width, height)
+    typical = median(each)
+    middle = np.array([median(along) for along in seen.T])
+    ways, given = ways_from(middle, camera.image_size), _Given(copies, judged, differ_px)
     places = np.concatenate([rays, camera.unproject(cells), camera.unproject(ways.reshape(-1, 2))])
     part_seen, part_frame = slice(len(seen)), slice(len(seen), len(seen) + len(cells))
-    lengths = np.ones(len(places))
-    lengths[part_seen] = each / typical
-    far = _Variances(scatter, richest, places, len(seen), np.inf)
-    near = _Variances(scatter, richest, lengths[:, None] * places, len(seen), typical)
-    seen_px, model_px, alike_px, views_px, bias_px = far.over(part_seen)
-    along = np.sqrt(far.total[len(seen) + len(cells) :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
+    far = _Variances(scatter, richest, poorer or scatter, places, len(seen), np.inf, given)
+    close = places[: part_frame.stop].copy()
+    close[part_seen] *= each[:, None] / typical
+    near = _Variances(scatter, richest, poorer or scatter, close, len(seen), typical, given)
+    seen_px, model_px, alike_px, views_px, bias_px = far.parts
+    along = np.sqrt(far.total[part_frame.stop :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
+    corners = seen if corners is None else corners
+    region = grown(middle, ways, along, FINE_PX, seen=corners)
+    imaged = _within_cells(np.isfinite(far.total[part_frame]), width, height)
     return CameraError(
         seen_px=seen_px,
-        frame_px=far.over(part_frame)[0],
-        near_seen_px=near.over(part_seen)[0],
-        near_frame_px=near.over(part_frame)[0],
+        frame_px=far.over(part_frame),
+        near_seen_px=near.over(part_seen),
+        near_frame_px=near.over(part_frame),
         model_px=model_px,
         alike_px=alike_px,
         views_px=views_px,
@@ -188,7 +250,9 @@ def predicted_error(
         far=np.sqrt(far.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
         near=np.sqrt(near.total[part_frame]).reshape(MAP_ROWS, MAP_COLUMNS),
         limit_px=FINE_PX,
-        region=_grown(middle, ways, (along <= FINE_PX) & _between(seen, ways)),
+        region=region,
+        share=float(inside(region, imaged).mean()),
+        seen_share=float(between(corners, imaged).mean()),
         without_px=np.sqrt(far.moved[part_seen].mean(0)),
     )
 
@@ -216,7 +280,7 @@ def seen_places(pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "s 2"]:
 def picked(pixels: Float[ndarray, "n 2"]) -> Int[ndarray, " s"]:
     """Which of the detected corners `seen_places` picks."""
     order = np.lexsort(pixels.T)
-    return order[np.unique(np.linspace(0, len(order) - 1, PLACE_COUNT).round().astype(int))]
+    return order[evenly(len(order), PLACE_COUNT)]
 
 
 def _settled(
@@ -248,46 +312,14 @@ def _spread(slopes: Float[ndarray, "n 2 d"], covariance: Float[ndarray, "d d"]) 
     return ((slopes @ covariance) * slopes).sum((1, 2))
 
 
-def _cells(width: int, height: int) -> Float[ndarray, "n 2"]:
-    """Centres of the map's cells, row by row."""
-    x = (np.arange(MAP_COLUMNS) + 0.5) / MAP_COLUMNS * width - 0.5
-    y = (np.arange(MAP_ROWS) + 0.5) / MAP_ROWS * height - 0.5
+def _cells(width: int, height: int, parts: int = 1) -> Float[ndarray, "n 2"]:
+    """Centres of the map's cells, row by row; of as many parts of each along both sides."""
+    x = (np.arange(parts * MAP_COLUMNS) + 0.5) / (parts * MAP_COLUMNS) * width - 0.5
+    y = (np.arange(parts * MAP_ROWS) + 0.5) / (parts * MAP_ROWS) * height - 0.5
     return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
 
 
-def _ways(middle: Float[ndarray, " 2"], width: int, height: int) -> Float[ndarray, "directions steps 2"]:
-    """Pixels from the middle to the frame's border, in many directions."""
-    angle = 2.0 * np.pi * np.arange(REGION_DIRECTIONS) / REGION_DIRECTIONS
-    way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    low, high = np.array([-0.5, -0.5]), np.array([width - 0.5, height - 0.5])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.where(way > 0, (high - middle) / way, (low - middle) / way)
-    reach = np.where(np.abs(way) > 1e-12, reach, np.inf).min(1)
-    share = np.arange(1, REGION_STEPS + 1) / REGION_STEPS
-    return middle + reach[:, None, None] * share[:, None] * way[:, None]
-
-
-def _grown(
-    middle: Float[ndarray, " 2"], ways: ndarray, good: Bool[ndarray, "directions steps"]
-) -> Float[ndarray, "n 2"]:
-    """The polygon of the last place in each direction up to which all are good; the middle where none is."""
-    reached = np.where(good.all(1), REGION_STEPS, np.argmin(good, axis=1))
-    edge = ways[np.arange(len(ways)), np.maximum(reached - 1, 0)]
-    return np.where(reached[:, None] > 0, edge, middle)
-
-
-def _between(seen: Float[ndarray, "s 2"], ways: ndarray) -> Bool[ndarray, "directions steps"]:
-    """Whether places lie in the convex hull of the seen ones: no farther out than they in any direction."""
-    angle = 2.0 * np.pi * np.arange(REGION_DIRECTIONS) / REGION_DIRECTIONS
-    outwards = np.stack([np.cos(angle), np.sin(angle)])
-    return (ways @ outwards <= (seen @ outwards).max(0)).all(-1)
-
-
-def _inside(polygon: Float[ndarray, "n 2"], pixels: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
-    """Whether places lie within a polygon: how often a line from them to the right crosses its sides."""
-    start, end = polygon, np.roll(polygon, -1, axis=0)
-    x, y = pixels[:, :1], pixels[:, 1:]
-    spans = (start[:, 1] > y) != (end[:, 1] > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = start[:, 0] + (y - start[:, 1]) * (end[:, 0] - start[:, 0]) / (end[:, 1] - start[:, 1])
-    return (spans & (x < crossing)).sum(1) % 2 == 1
+def _within_cells(some: Bool[ndarray, " n"], width: int, height: int) -> Float[ndarray, "m 2"]:
+    """Places within some of the map's cells, so many that shares of them are shares of area."""
+    parts = np.ones((CELL_PARTS, CELL_PARTS), dtype=bool)
+    return _cells(width, height, CELL_PARTS)[np.kron(some.reshape(MAP_ROWS, MAP_COLUMNS), parts).ravel()]

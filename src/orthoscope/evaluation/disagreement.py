@@ -19,10 +19,15 @@ How much the camera changes is the spread of the wishes without their noise: kap
 expectation maximisation, and the rms movement of the image that S makes, a rotation fitted out.  A shutter
 that reads row after row shears the image, which is no change of K, and is tested in the same way.  The focal
 length alone and the principal point alone are tested too: one wish out of many stands out more by itself.
+
+What changes is named where it stands out: the F2 of the focal length, of the principal point, of the lens's
+first coefficient or of the shear is NAMED_MARGIN times that of any other.  What none of them explains by
+itself has no name, and is `mixed`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -37,7 +42,16 @@ from orthoscope.models.difference import image_difference
 from orthoscope.models.parameters import Parameters
 from orthoscope.targets.detections import Detections
 
-__all__ = ["AGREED", "Disagreement", "Wishes", "changes_of", "disagreement", "spread_of", "wishes"]
+__all__ = [
+    "AGREED",
+    "Disagreement",
+    "Wishes",
+    "changes_of",
+    "disagreement",
+    "spread_of",
+    "wishes",
+    "with_spread",
+]
 
 # A change of K that counts as 1 is this share of the focal length or of the image's width.
 STEP_SHARE = 0.01
@@ -52,11 +66,12 @@ LARGE_F2 = 3.0
 DISAGREEING_P_VALUE = 1e-6
 # With fewer views it cannot be told whether they agree.
 FEWEST_TESTED_VIEWS = 5
-KINDS = {
-    "zoom": [0],
-    "centre": [1, 2],
-    "shutter": [3, 4],
-}  # columns: scale, cx, cy, and the shears of a shutter
+# Columns: scale, cx, cy, the shears of a shutter, and the lens's first coefficient, where there is one.
+KINDS = {"zoom": [0], "centre": [1, 2], "shutter": [3, 4], "lens": [5]}
+# These kinds are tested; a lens that changes shows in K as well, and is only named.
+TESTED_KINDS = ("zoom", "centre", "shutter")
+# What stands out no more than so many times as much as anything else has no name.
+NAMED_MARGIN = 1.4
 # Expectation maximisation has so many rounds.
 SPREADING_ROUNDS = 200
 # An image's movement is looked at in so many pixels.
@@ -98,12 +113,14 @@ class Disagreement:
     Attributes:
         f2, p_value: of the test; NaN where the views do not suffice for one.
         certain: whether they surely do not.
-        kind: what changes most between them: `zoom`, `centre`, `shutter`; empty where they agree.
+        kind: what changes between them: `zoom`, `centre`, `lens`, `shutter`, or `mixed` where none stands
+            out; empty where they agree.
         by_px: how far the image moves from photograph to photograph, rms over the seen pixels and the
-            photographs, after a rotation.
+            photographs, after a rotation; 0 where it is one and the same camera, whose image was sheared.
         focal: standard deviation of the focal length over photographs, as a share of it.
         centre_px: standard deviation of the principal point, pixels.
-        wishes: of scale, cx and cy; None where there was no test, or it was read from a file.
+        wishes: of scale, cx and cy, and of k1 where the lens changes; None where there was no test, or it was
+            read from a file.
     """
 
     f2: float
@@ -126,28 +143,47 @@ def disagreement(fit: Linearised, detections: Detections) -> Disagreement:
         fit: with every corner free and a free lens, of these detections.
     """
     names, changes = changes_of(fit)
-    points, pixels = detections.target.points, np.concatenate([view.pixels for view in detections.views])
+    points = detections.target.points
     if fit.views < FEWEST_TESTED_VIEWS or len(names) < 3:
         return AGREED
-    moves = np.concatenate(
-        [fit.moves(changes), fit.without_pose(fit.root[..., None] * _shears(detections))], axis=2
-    )
+    shears = fit.without_pose(fit.root[..., None] * _shears(detections))
+    of_lens = changes_of(fit, ("k1",))[1][:, len(names) :]
+    moves = np.concatenate([fit.moves(changes), shears, fit.moves(of_lens)], axis=2)
     of_K = wishes(fit, points, moves[:, :, : len(names)])
-    tests = [of_K, *(wishes(fit, points, moves[:, :, columns]) for columns in KINDS.values())]
+    by_kind = {
+        kind: wishes(fit, points, moves[:, :, columns])
+        for kind, columns in KINDS.items()
+        if columns[-1] < moves.shape[2]
+    }
+    tests = [of_K, *(by_kind[kind] for kind in TESTED_KINDS)]
     strongest = min(tests, key=lambda test: (not test.certain, test.p_value))
     if not strongest.certain:
         return replace(AGREED, f2=of_K.f2, p_value=of_K.p_value, wishes=of_K)
-    spread = of_K.spread
-    width = fit.camera.image_size[0]
-    return Disagreement(
-        f2=strongest.f2,
-        p_value=strongest.p_value,
-        certain=True,
-        kind=_kind(fit, moves),
+    kind = _kind(by_kind)
+    of_camera = wishes(fit, points, moves[:, :, [0, 1, 2, 5]]) if kind == "lens" else of_K
+    found = Disagreement(strongest.f2, strongest.p_value, True, kind, 0.0, 0.0, 0.0, of_camera)
+    sure = any(test.certain for test in (of_K, by_kind["zoom"], by_kind["centre"]))
+    if kind == "shutter" or (kind == "mixed" and not sure):
+        return found
+    return with_spread(found, fit, detections)
+
+
+def with_spread(found: Disagreement, fit: Linearised, detections: Detections) -> Disagreement:
+    """By how much the cameras of views that differ do so.
+
+    Args:
+        fit, detections: that were tested.
+    """
+    if found.wishes is None:
+        return found
+    spread, width = found.wishes.spread, fit.camera.image_size[0]
+    changes = changes_of(fit, ("k1",))[1][:, : len(spread)]
+    pixels = np.concatenate([view.pixels for view in detections.views])
+    return replace(
+        found,
         by_px=_movement(fit, changes, spread, pixels),
         focal=STEP_SHARE * float(np.sqrt(spread[0, 0])),
         centre_px=STEP_SHARE * width * float(np.sqrt(spread[1, 1] + spread[2, 2])),
-        wishes=of_K,
     )
 
 
@@ -254,22 +290,10 @@ def _moved_squared(camera: Camera, names: tuple[str, ...], step: ndarray, pixels
     return float(np.nanmean((difference**2).sum(1)))
 
 
-def _kind(fit: Linearised, moves: Float[ndarray, "m n 5"]) -> str:
-    """Which of KINDS explains most, for each of its columns, of what the others leave."""
-    told = _told(moves, hat_of(fit, moves))
-    score = (moves * fit.errors[..., None]).sum(1)
-
-    def explained(columns: list[int]) -> float:
-        inverse, _ = _pseudo_inverse(told[:, columns][:, :, columns])
-        return float((score[:, columns] * (inverse @ score[:, columns, None])[..., 0]).sum())
-
-    everything = list(range(moves.shape[2]))
-    whole = explained(everything)
-    beyond = {
-        kind: (whole - explained([i for i in everything if i not in columns])) / len(columns)
-        for kind, columns in KINDS.items()
-    }
-    return max(beyond, key=lambda kind: beyond[kind])
+def _kind(by_kind: Mapping[str, Wishes]) -> str:
+    """Which of KINDS stands out; `mixed` where none does."""
+    first, second = sorted(by_kind, key=lambda kind: -by_kind[kind].f2)[:2]
+    return first if by_kind[first].f2 > NAMED_MARGIN * by_kind[second].f2 else "mixed"
 
 
 def _shears(detections: Detections) -> Float[ndarray, "m n 2"]:

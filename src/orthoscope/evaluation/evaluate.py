@@ -16,11 +16,11 @@ import numpy as np
 
 from orthoscope.evaluation.camera_error import CameraError
 from orthoscope.evaluation.coverage import share_covered
-from orthoscope.evaluation.disagreement import AGREED, Disagreement, disagreement
-from orthoscope.evaluation.groups import Groups, two_groups
+from orthoscope.evaluation.disagreement import AGREED, Disagreement
+from orthoscope.evaluation.groups import Groups
 from orthoscope.evaluation.metrics import nce_of
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
-from orthoscope.evaluation.reference_fit import ReferenceFit, reference_fit
+from orthoscope.evaluation.reference_fit import reference_fit
 from orthoscope.evaluation.suspects import ViewError
 from orthoscope.evaluation.unseen_views import in_folds, in_turn
 from orthoscope.evaluation.verdict.facts import Findings, situation_of
@@ -30,15 +30,15 @@ from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.held_out import USUAL_FOLDS
-from orthoscope.fitting.leave_one_out import leave_one_out
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
-from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
+from orthoscope.geometry.arrays import Bool, Float, median, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import check_settings
 from orthoscope.methods.decoupled.fits import fits_of
 from orthoscope.models.camera import Camera
+from orthoscope.models.image_size import check_image_size
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 
@@ -127,12 +127,7 @@ def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | 
         InputError: the photographs are of another size than the camera's.
         CalibrationError: no view can be used.
     """
-    if tuple(detections.image_size) != tuple(camera.image_size):
-        (width, height), (w, h) = detections.image_size, camera.image_size
-        raise InputError(
-            f"these photographs are {width}x{height}; the camera was calibrated at {w}x{h}. Hand in"
-            " photographs of that size."
-        )
+    check_image_size(camera, detections.image_size)
     used = with_usable_views(detections)
     poses = resect(camera, used, shape=shape)
     if has_outlines(used):
@@ -179,7 +174,7 @@ def evaluate(
     return Evaluation(
         calibration=calibration,
         rms_px=rms(np.concatenate(residuals)),
-        median_px=float(np.median(sizes)),
+        median_px=median(sizes),
         largest_px=float(sizes.max()),
         held_out_rms_px=unseen.rms_px,
         held_out_error_px=unseen.error_px,
@@ -211,19 +206,7 @@ def _findings(
     calibration: Calibration, fits: Fits, views: tuple[ViewError, ...], misfits: Misfit
 ) -> Findings:
     reference = reference_fit(calibration, fits)
-    differ, groups = _agreement(reference, calibration.detections)
-    return Findings(calibration, views, misfits, reference, differ, groups)
-
-
-def _agreement(reference: ReferenceFit | None, detections: Detections) -> tuple[Disagreement, Groups | None]:
-    """Whether the photographs agree on one camera, and if not, which of them belong together."""
-    if reference is None:
-        return AGREED, None
-    found = disagreement(reference.known, detections)
-    if not found.certain:
-        return found, None
-    whole = leave_one_out(reference.known)
-    return found, two_groups(reference.known, found, whole, detections, base=reference.base)
+    return Findings(calibration, views, misfits, reference)
 
 
 def _trained_nce(calibration: Calibration) -> float:

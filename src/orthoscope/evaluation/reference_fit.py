@@ -8,21 +8,24 @@ of them out does, and, beside the calibration's own fit, how far off its camera 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from orthoscope.evaluation.camera_error import CameraError, picked, predicted_error, rms_difference
+from orthoscope.evaluation.camera_error import CameraError, picked, predicted_error
+from orthoscope.evaluation.disagreement import Disagreement, disagreement, with_spread
+from orthoscope.evaluation.groups import Groups, two_groups
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.fits import Fits
-from orthoscope.fitting.leave_one_out import LeaveOneOut
+from orthoscope.fitting.fits import Fits, RichestFit
+from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.near_copies import near_copies
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.methods.decoupled.fits import richest_of_all
+from orthoscope.targets.detections import Detections
 
 __all__ = ["ReferenceFit", "reference_fit"]
 
-# A camera that is nearer to a fit of which all is known than this share of the error is that fit's.
-AS_GOOD_SHARE = 0.2
 # Methods whose own fit leaves views out: where it cannot, nothing is known of their camera.
 ONE_FIT = ("decoupled", "fccm")
 
@@ -32,17 +35,25 @@ class ReferenceFit:
     """The richest fit and what it says.
 
     Attributes:
+        detections: that it was made from, all or some that stand for many.
         known: it, linearised.
         left_out: each view left out of it.
         base: the formula under its free lens.
+        disagreement: whether the photographs agree on one camera.
+        groups: of photographs of two cameras; None where there is one.
+        of_all: a fit of all views, linearised: the calibration's own model, or this one.
         error: how far off the calibration's own camera is.
         own_left_out: (m,) squared error of each view, px^2, by the calibration's own model without it.
         own_squares: (m,) the same with it, as the calibration is.
     """
 
+    detections: Detections
     known: Linearised
     left_out: LeaveOneOut
     base: str
+    disagreement: Disagreement
+    groups: Groups | None
+    of_all: Linearised
     error: CameraError
     own_left_out: Float[ndarray, " m"]
     own_squares: Float[ndarray, " m"]
@@ -56,21 +67,53 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
     """
     if fits.richest is None or (fits.own is None and calibration.method in ONE_FIT):
         return None
-    base, known, left_out, of_richest = fits.richest
-    scatter = fits.own.scatter if fits.own else of_richest
-    richest = None if scatter is of_richest else of_richest
+    richest, own = fits.richest, fits.own
+    scatter = own.scatter if own else richest.scatter
     pixels = np.concatenate([view.pixels for view in calibration.detections.views])
     some = picked(pixels)
     seen, distance = pixels[some], _distances(calibration)[some]
-    error = predicted_error(scatter, seen, distance=distance, richest=richest)
-    apart = rms_difference(calibration.camera, scatter.camera, seen)
-    if apart > AS_GOOD_SHARE * error.seen_px:
-        # Not the minimum of a fit whose scatter is known: what is apart is its bias.
-        near_px, far_px = (float(np.hypot(px, apart)) for px in (error.near_seen_px, error.seen_px))
-        error = replace(error, seen_px=far_px, near_seen_px=near_px, bias_px=apart)
-    without = (fits.own.left_out**2).sum(1) if fits.own else left_out.squares
+    differ, groups = _agreement(richest, calibration)
+    photographs = near_copies(calibration.detections)
+    error = predicted_error(
+        scatter,
+        seen,
+        distance=distance,
+        richest=richest.scatter if own else None,
+        poorer=richest.poorer,
+        judged=calibration.camera,
+        corners=pixels,
+        copies=len(photographs) / (int(photographs.max()) + 1),
+        differ_px=differ.by_px,
+    )
+    without = (own.left_out**2).sum(1) if own else richest.left_out.squares
     within = np.array([float(np.nansum(e**2)) for e in calibration.residuals()])
-    return ReferenceFit(known, left_out, base, error, without, within)
+    return ReferenceFit(
+        detections=richest.detections,
+        known=richest.known,
+        left_out=richest.left_out,
+        base=richest.base,
+        disagreement=differ,
+        groups=groups,
+        of_all=own.known if own and richest.detections is not calibration.detections else richest.known,
+        error=error,
+        own_left_out=without,
+        own_squares=within,
+    )
+
+
+def _agreement(richest: RichestFit, calibration: Calibration) -> tuple[Disagreement, Groups | None]:
+    """Whether the photographs agree on one camera, and if not, which of them belong together; where some of
+    them do not agree, all are asked.
+    """
+    known, detections = richest.known, calibration.detections
+    found = disagreement(known, richest.detections)
+    if found.certain and richest.detections is not detections and (all_ := richest_of_all(calibration)):
+        known = all_.known
+        found = disagreement(known, detections)
+    if not found.certain:
+        return found, None
+    groups = two_groups(known, found, leave_one_out(known), detections, base=richest.base)
+    return (with_spread(found, known, detections) if groups else found), groups
 
 
 def _distances(calibration: Calibration) -> Float[ndarray, " n"]:

@@ -16,7 +16,7 @@ import numpy as np
 from orthoscope.evaluation.coverage import place_of
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.scatter import patterns_over_views
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, median, ndarray
 from orthoscope.geometry.numbers import rough_pixels
 from orthoscope.targets.detections import Detections
 
@@ -59,13 +59,13 @@ def suspects_among(
     """Images of the photographs that do not belong, with what is wrong.
 
     Args:
-        known: the richest fit of them, where there is one.
+        known: a fit of them, linearised, where there is one.
         points: the target's corners, nominal.
     """
     errors = np.array([view.rms_px for view in views])
     if len(views) < FEWEST_TELLING_VIEWS:
         return ()
-    typical = float(np.median(errors))
+    typical = median(errors)
     odd = np.flatnonzero(errors > max(SUSPECT_FACTOR * typical, NOTABLE_PX))
     if not len(odd):
         return ()
@@ -104,7 +104,7 @@ def precious_among(
     if len(corners) < FEWEST_TELLING_VIEWS:
         return ()
     own, foreseen = np.sqrt(within / corners), np.sqrt(without / corners)
-    typical = float(np.nanmedian(foreseen))
+    typical = median(foreseen[~np.isnan(foreseen)])
     alone = np.isnan(foreseen) | ((foreseen > ALONE_FACTOR * own) & (foreseen > GAINED_FACTOR * typical))
     return tuple(
         (view.image, place_of(view.pixels, detections.image_size))

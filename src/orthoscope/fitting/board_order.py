@@ -38,6 +38,8 @@ FEWEST_ORDERED_VIEWS = 3
 LIKELY_SHARE = 1e-3
 # Chance gives no gain of this many times the noise's variance for each view that is turned.
 SURE_GAIN = 10.0
+# The turns are searched for in so many views, of those that tell most; all others follow from these.
+SEARCHED_VIEWS = 60
 # So many views, of those that tell most, are taken for the right one in turn.
 START_VIEWS = 24
 # So many views are looked at together, to keep what is between in a core's cache.
@@ -192,6 +194,10 @@ class _Sums:
         prior = np.diag(np.concatenate([1e-9 * np.diag(gram[:, 0].sum(0))[:k], np.full(3 * r, precision)]))
         return cls(gram, right, prior, square, freedom, k, _after(turns))
 
+    def only(self, views: Int[ndarray, " v"]) -> _Sums:
+        """Those of some views."""
+        return replace(self, gram=self.gram[views], right=self.right[views])
+
     def shape(self, turns: Int[ndarray, " m"], views: Int[ndarray, " v"]) -> Float[ndarray, " c"]:
         """Camera and shape that some views tell together, each turned as said."""
         gram, right = self.gram[views, turns[views]].sum(0), self.right[views, turns[views]].sum(0)
@@ -230,24 +236,42 @@ def _chosen(sums: _Sums) -> Int[ndarray, " m"]:
     m = len(sums.gram)
     none = np.zeros(m, dtype=np.int64)
     before, _ = sums.total(none)
-    best, cost = none, before
-    for first in sums.telling(START_VIEWS):
-        tried = none.copy()
-        told = sums.shape(tried, np.array([first]))
-        for _ in range(ROUND_LIMIT):
-            before_this, tried = tried, sums.costs(told).argmin(1)
-            if (tried == before_this).all():
-                break
-            told = sums.shape(tried, np.arange(m))
-        total, _ = sums.total(tried)
-        if total < cost - 1e-9 * sums.square:
-            best, cost = tried, total
+    if m <= SEARCHED_VIEWS:
+        best = _searched(sums)
+    else:
+        some = sums.only(sums.telling(SEARCHED_VIEWS))
+        best = _settled(sums, some.total(_searched(some))[1])
+    cost, _ = sums.total(best)
     best = _least_turned(best, sums.after)
     noise = max(sums.square + cost, 1e-12 * sums.square) / max(sums.freedom, 1)
     needed = (
         SURE_GAIN * noise * sums.likeness(best, sums.total(best)[1], noise) * max(int((best > 0).sum()), 1)
     )
     return best if before - cost > needed else none
+
+
+def _searched(sums: _Sums) -> Int[ndarray, " m"]:
+    """The best end that taking one view after the other for the right one comes to."""
+    best = np.zeros(len(sums.gram), dtype=np.int64)
+    cost, _ = sums.total(best)
+    for first in sums.telling(START_VIEWS):
+        tried = _settled(sums, sums.shape(np.zeros_like(best), np.array([first])))
+        total, _ = sums.total(tried)
+        if total < cost - 1e-9 * sums.square:
+            best, cost = tried, total
+    return best
+
+
+def _settled(sums: _Sums, told: Float[ndarray, " c"]) -> Int[ndarray, " m"]:
+    """The turns that a camera and a shape come to, which are found anew from all views again and again."""
+    every = np.arange(len(sums.gram))
+    tried = np.zeros_like(every)
+    for _ in range(ROUND_LIMIT):
+        before, tried = tried, sums.costs(told).argmin(1)
+        if (tried == before).all():
+            break
+        told = sums.shape(tried, every)
+    return tried
 
 
 def _least_turned(chosen: Int[ndarray, " m"], after: Int[ndarray, "g g"]) -> Int[ndarray, " m"]:

@@ -84,12 +84,12 @@ class Variances(NamedTuple):
 
 
 class Candidate(NamedTuple):
-    """What a method tried, and how well it foresees photographs that it has not seen.
+    """What a method tried, and how well it predicts photographs that it has not seen.
 
     Attributes:
         target: the kind of the target's shape.
         lens: a formula, or `free`.
-        held_out_px: rms over all corners, each view foreseen by the others, pixels per point; NaN where no
+        held_out_px: rms over all corners, each view predicted by the others, pixels per point; NaN where no
             view could judge it.
         standard_error_px: of it, views taken as independent draws.
         loses_px: its held-out error less that of the one that was taken.

@@ -13,6 +13,7 @@ from orthoscope.fitting.leave_one_out import LeaveOneOut
 from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.scatter import Scatter
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.targets.detections import Detections
 
 __all__ = ["Fits", "OwnFit", "RichestFit"]
 
@@ -21,28 +22,36 @@ class OwnFit(NamedTuple):
     """The calibration's own model.
 
     Attributes:
+        known: the fit, linearised.
         left_out: (m,2p) residuals of each view by the fit without it, as in `LeaveOneOut`.
         scatter: of its camera.
     """
 
+    known: Linearised
     left_out: Float[ndarray, "m n"]
     scatter: Scatter
 
 
 class RichestFit(NamedTuple):
-    """Every corner free and a free lens.
+    """Every corner free and a free lens, of all photographs or, where they are many, of some that stand for
+    them.
 
     Attributes:
+        detections: that it was made from.
         base: the formula under the free lens.
         known: the fit, linearised.
         left_out: each view left out of it.
         scatter: of its camera.
+        poorer: scatter of the calibration's own model on the same photographs; None where that is this fit,
+            or is not known.
     """
 
+    detections: Detections
     base: str
     known: Linearised
     left_out: LeaveOneOut
     scatter: Scatter
+    poorer: Scatter | None
 
 
 class Fits(NamedTuple):

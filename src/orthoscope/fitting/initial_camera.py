@@ -35,7 +35,7 @@ from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Cauchy
 
-__all__ = ["Assumptions", "StartingCameras", "starts", "starts_elsewhere", "suited_lens"]
+__all__ = ["Assumptions", "StartingCameras", "formula_for", "starts", "starts_elsewhere", "suited_lens"]
 
 # These diagonal fields of view are tried.
 FIELDS_OF_VIEW = np.deg2rad([6, 12, 20, 30, 40, 60, 80, 100, 120, 140, 160, 180, 200, 220, 250])
@@ -60,6 +60,8 @@ MOST_STARTS = 3
 NEUTRAL_COEFFICIENTS: dict[type[Formula], tuple[dict[str, float], ...]] = {
     Rational: ({}, {"k1": 1.0, "k4": 1.0}),
 }
+# One lens of the angle for all, since what a lens finds out about its domain stays with it.
+EQUIDISTANT = KannalaBrandt()
 
 
 @dataclass(frozen=True)
@@ -271,8 +273,12 @@ def suited_lens(bases: StartingCameras) -> str:
     """
     if bases.pinhole_fits or bases.angle is None:
         return "brown"
-    rays = bases.rays(bases.refined(bases.angle))
-    return "kannala_brandt" if rays[:, 2].min(initial=1.0) < np.cos(WIDE_ANGLE) else "brown"
+    return formula_for(bases.rays(bases.refined(bases.angle)))
+
+
+def formula_for(rays: Float[ndarray, "n 3"]) -> str:
+    """`brown`, or `kannala_brandt` where unit rays lie more than WIDE_ANGLE from the axis."""
+    return "kannala_brandt" if np.nanmin(rays[:, 2], initial=1.0) < np.cos(WIDE_ANGLE) else "brown"
 
 
 def _plausible(K: Intrinsics, image_size: tuple[int, int], away: float = 0.0) -> bool:
@@ -290,9 +296,7 @@ def _plausible(K: Intrinsics, image_size: tuple[int, int], away: float = 0.0) ->
 
 def _equidistant(image_size: tuple[int, int], focal: float) -> Camera:
     width, height = image_size
-    return Camera(
-        image_size, Intrinsics(focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)), KannalaBrandt()
-    )
+    return Camera(image_size, Intrinsics(focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)), EQUIDISTANT)
 
 
 def _misfit(estimate: Estimate, observations: Observations, points: Float[ndarray, "p 3"]) -> float:
@@ -319,7 +323,9 @@ def _with_lens(
     rays = bases.rays(refined)
     if lens.chart is GNOMONIC:
         rays = _before_steep(rays, lens)
-    return [bases.posed(converted(refined, lens, rays, free=(*bases.narrowing.free, *coefficients)))]
+    free = (*bases.narrowing.free, *coefficients)
+    groups = [[start] for start in lens.starts] if lens.several_minima else [lens.starts]
+    return [bases.posed(converted(refined, lens, rays, free=free, starts=group)) for group in groups]
 
 
 def _before_steep(rays: Float[ndarray, "n 3"], lens: type[Formula]) -> Float[ndarray, "m 3"]:

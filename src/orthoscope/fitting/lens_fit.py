@@ -7,7 +7,7 @@ into another: the rays are then those of the first.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -91,7 +91,12 @@ def fit_lens(
 
 
 def converted(
-    camera: Camera, lens: type[Formula], rays: Float[ndarray, "n 3"], *, free: Sequence[str] = ()
+    camera: Camera,
+    lens: type[Formula],
+    rays: Float[ndarray, "n 3"],
+    *,
+    free: Sequence[str] = (),
+    starts: Sequence[Mapping[str, float]] = (),
 ) -> Camera:
     """The camera with another lens formula, nearest in pixels to the first over the given rays.
 
@@ -100,12 +105,13 @@ def converted(
         lens: the other formula.
         rays: (n,3), of any length.
         free: parameters of K and the lens that move; by default FOCAL and what the formula frees.
+        starts: coefficients to start from; by default the formula's own.
     Raises:
         CalibrationError: the formula cannot see these rays.
     """
-    starts = [replace(camera, lens=lens(**coefficients)) for coefficients in lens.starts]
+    cameras = [replace(camera, lens=lens(**coefficients)) for coefficients in starts or lens.starts]
     return fit_pairs(
-        about_principal_point(rays, camera.project(rays), free or (*FOCAL, *lens.free)), starts
+        about_principal_point(rays, camera.project(rays), free or (*FOCAL, *lens.free)), cameras
     ).unknowns
 
 

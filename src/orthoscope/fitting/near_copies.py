@@ -6,11 +6,11 @@ left out together (leave_one_out.py) and count as one photograph.
 
 from __future__ import annotations
 
-from itertools import product
+from functools import lru_cache
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Int, ndarray
+from orthoscope.geometry.arrays import Int, evenly, median, ndarray
 from orthoscope.targets.detections import Detections
 
 __all__ = ["near_copies", "summed_over"]
@@ -23,42 +23,44 @@ USUAL_WIDTH = 1000.0
 FEWEST_COMMON = 4
 # So many corners tell first which views may be copies at all.
 FIRST_CORNERS = 16
-# A corner that moved by less than a cell lies in its own cell or in one of those around it.
-NEIGHBOURS = tuple(product((-1, 0, 1), repeat=2))
 
 
+@lru_cache(maxsize=4)
 def near_copies(detections: Detections) -> Int[ndarray, " m"]:
     """Which photograph each view is: the number, from 0, of the first view that it copies, counted without
     copies.
+
+    Many ask for it, of the same detections.
     """
     near = COPIED_PX * max(1.0, max(detections.image_size) / USUAL_WIDTH)
     views, corners = len(detections.views), len(detections.target.points)
     tables = np.full((views, corners, 2), np.nan)
     for table, view in zip(tables, detections.views, strict=True):
         table[view.ids] = view.pixels
-    some = np.unique(np.linspace(0, corners - 1, FIRST_CORNERS).round().astype(int))
+    some = evenly(corners, FIRST_CORNERS)
     cells = np.floor(np.nan_to_num(tables[:, some], nan=-1e9) / near).astype(np.int64)
     seen = np.isfinite(tables[:, some, 0])
     number = np.zeros(views, dtype=np.int64)
-    kept: list[int] = []
-    at: dict[tuple[int, int, int], list[int]] = {}  # kept views by where they see a few corners
+    kept = np.zeros(views, dtype=np.int64)  # the first so many: views that copy none before them
+    count = 0
     for i in range(views):
-        places = [(int(k), int(cells[i, k, 0]), int(cells[i, k, 1])) for k in np.flatnonzero(seen[i])]
-        around = ((k, x + dx, y + dy) for k, x, y in places for dx, dy in NEIGHBOURS)
-        perhaps = {n for place in around for n in at.get(place, ())} if places else range(len(kept))
-        same = [n for n in sorted(perhaps) if _is_copy(tables[kept[n]], tables[i], near)]
-        number[i] = same[0] if same else len(kept)
+        before = kept[:count]
+        # A corner that moved by less than a cell lies in its own cell or in one of those around it.
+        close = (np.abs(cells[before] - cells[i]) <= 1).all(-1) & seen[before] & seen[i]
+        perhaps = np.flatnonzero(close.any(1)) if seen[i].any() else range(count)
+        same = [n for n in perhaps if _is_copy(tables[kept[n]], tables[i], near)]
+        number[i] = same[0] if same else count
         if not same:
-            for place in places:
-                at.setdefault(place, []).append(len(kept))
-            kept.append(i)
+            kept[count] = i
+            count += 1
+    number.setflags(write=False)
     return number
 
 
 def _is_copy(one: ndarray, other: ndarray, near: float) -> bool:
     apart = np.hypot(*(one - other).T)
     common = np.isfinite(apart)
-    return bool(common.sum() >= FEWEST_COMMON and np.median(apart[common]) < near)
+    return bool(common.sum() >= FEWEST_COMMON and median(apart[common]) < near)
 
 
 def summed_over(groups: Int[ndarray, " m"], values: ndarray) -> ndarray:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Float, Int, ndarray
+from orthoscope.geometry.arrays import Float, Int, evenly, ndarray
 from orthoscope.geometry.pose import Pose, nearest_rotation
 from orthoscope.targets.detections import Detections
 
@@ -115,7 +115,7 @@ class Observations:
 
     def evenly(self, views: int) -> Int[ndarray, " v"]:
         """The numbers of at most so many rows, evenly picked."""
-        return np.unique(np.linspace(0, len(self.order) - 1, views).round().astype(int))
+        return evenly(len(self.order), views)
 
     def only(self, rows: Int[ndarray, " v"]) -> Observations:
         """The table of these rows (ascending)."""

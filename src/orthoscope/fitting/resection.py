@@ -5,13 +5,15 @@ A homography to the camera's rays starts it, least squares in pixels ends it; no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from orthoscope.fitting.calibration import points_of
 from orthoscope.fitting.closed_form import poses_of_camera
-from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.observations import Observations, Poses
 from orthoscope.fitting.reprojection import Estimate, Reprojection
-from orthoscope.geometry.arrays import CalibrationError
+from orthoscope.geometry.arrays import CalibrationError, Float, Int, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
@@ -22,10 +24,18 @@ from orthoscope.targets.detections import Detections
 
 __all__ = ["resect"]
 
+# With fewer corners a view has no pose.
+FEWEST_SEEN = 4
+
 
 @with_one_thread
 def resect(
-    camera: Camera, detections: Detections, *, shape: TargetShape | None = None, loss: Loss | None = None
+    camera: Camera,
+    detections: Detections,
+    *,
+    shape: TargetShape | None = None,
+    loss: Loss | None = None,
+    near: Sequence[Pose] | None = None,
 ) -> tuple[Pose, ...]:
     """camera_from_target of each view, by least squares over its corners, the camera being fixed.
 
@@ -34,12 +44,18 @@ def resect(
         detections: what was found in them.
         shape: of the target, fixed too; flat by default.
         loss: what a squared residual costs; least squares by default.
+        near: poses of the views to start from; by default those of homographies.
     Raises:
         CalibrationError: a view has fewer than four corners inside the lens's domain.
     """
     observations = Observations.of(detections)
-    poses = poses_of_camera(camera, observations, detections.target.points)
-    lost = observations.order[~np.isfinite(poses.translation).all(1)]
+    if near is None:
+        poses = poses_of_camera(camera, observations, detections.target.points)
+        known = np.isfinite(poses.translation).all(1)
+    else:
+        poses = observations.poses_of(near)
+        known = _seen(camera, observations, poses, detections.target.points) >= FEWEST_SEEN
+    lost = observations.order[~known]
     if len(lost):
         name = detections.views[int(lost.min())].image
         raise CalibrationError(
@@ -53,3 +69,12 @@ def resect(
             "the target lies behind this camera in some view. Use the camera that took the photographs."
         )
     return observations.poses_in_order(solution.unknowns.poses)
+
+
+def _seen(
+    camera: Camera, observations: Observations, poses: Poses, points: Float[ndarray, "p 3"]
+) -> Int[ndarray, " m"]:
+    """How many of its corners the camera sees in each view."""
+    there = points[observations.ids] @ poses.rotation.transpose(0, 2, 1) + poses.translation[:, None]
+    image = camera.project(there.reshape(-1, 3))[:, 0].reshape(observations.ids.shape)
+    return (np.isfinite(image) & (observations.present > 0)).sum(1)

@@ -5,6 +5,8 @@ them by one linear step:
 
 model      independent errors of corners, and the priors' own scatter: noise H^-1
 prior      the second of these alone: noise H^-1 L H^-1
+repeated   the first of these alone, `model` without the priors' part: noise H^-1 A'A H^-1, the scatter over
+           photographs that are taken again, which is what can be sampled
 alike      `model`, with errors that are alike within a view: smooth patterns of order 2, 3 and 4 over the
            board count tau_o times, as often as they are larger in the residuals than independent errors make
            them
@@ -29,7 +31,7 @@ import numpy as np
 
 from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of
 from orthoscope.fitting.linearised import Linearised
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, evenly, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import polynomials
 
@@ -79,6 +81,11 @@ class Scatter:
         return known.T @ known
 
     @property
+    def repeated(self) -> Float[ndarray, "d d"]:
+        """What independent errors of corners make alone."""
+        return self.model - (self.prior - self.stretch)
+
+    @property
     def parameters(self) -> Float[ndarray, "k k"]:
         """Covariance of the named parameters: of each the larger deviation, correlated as the model says."""
         k = len(self.names)
@@ -95,7 +102,7 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
     Args:
         points: the target's corners, nominal.
     """
-    some = fit.only(_evenly(fit.views, VIEW_COUNT))
+    some = fit.only(evenly(fit.views, VIEW_COUNT))
     patterns = patterns_over_views(some, points)
     tau = likenesses(some, patterns)
     camera = np.zeros((fit.of_camera, fit.of_camera))
@@ -171,7 +178,3 @@ def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "_ _ _"]]) -> 
         by_chance = fit.noise * float((rows**2).sum() - (rows * hat_of(fit, rows)).sum())
         found.append(max(1.0, float(in_residuals) / max(by_chance, 1e-300)))
     return tuple(found)
-
-
-def _evenly(views: int, wanted: int) -> ndarray:
-    return np.unique(np.linspace(0, views - 1, wanted).round().astype(int))

@@ -1,4 +1,4 @@
-"""basalt's calibration (JSON of cereal): cameras by number, kb4, pinhole and pinhole-radtan8.
+"""basalt's calibration (JSON of cereal): cameras by number, kb4, ds, eucm, ucm, pinhole and pinhole-radtan8.
 
 The file holds the inertial sensor too; what is not known of it is written as basalt's defaults, for a camera
 that stands in the sensor's frame.
@@ -88,11 +88,12 @@ BASALT = Format(
         Holding("brown", "pinhole-radtan8", OPENCV_ORDER[:8]),
         Holding("rational", "pinhole-radtan8", OPENCV_ORDER[:8]),
         Holding("kannala_brandt", "kb4", ("k1", "k2", "k3", "k4")),
+        Holding("double_sphere", "ds", ("xi", "alpha")),
+        Holding("eucm", "eucm", ("alpha", "beta")),
+        Holding("eucm", "ucm", ("alpha",), written=False),
     ),
     recognises=_recognises,
     read=_read,
     write=_write,
-    remarks="The inertial sensor's numbers are basalt's defaults, the camera stands in its frame; ds, ucm"
-    " and eucm are"
-    " not read.",
+    remarks="The inertial sensor's numbers are basalt's defaults, the camera stands in its frame.",
 )

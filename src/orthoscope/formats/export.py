@@ -17,7 +17,7 @@ import numpy as np
 
 from orthoscope.files.whole_files import write_bytes
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.lens_fit import FOCAL, about_principal_point, fit_pairs
+from orthoscope.fitting.lens_fit import FOCAL, Pairs, about_principal_point, fit_pairs
 from orthoscope.formats.record import Contents, Format, Holding, share_beyond, shifted
 from orthoscope.formats.table import tool as record_of
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
@@ -26,6 +26,7 @@ from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.difference import frame_grid
 from orthoscope.models.lenses import lens_name, parse_lens
 from orthoscope.simulation.scene import Scene
+from orthoscope.solve.least_squares import Options
 
 __all__ = ["LIMIT_PX", "Exportable", "Exported", "export", "exportable"]
 
@@ -33,6 +34,8 @@ __all__ = ["LIMIT_PX", "Exportable", "Exported", "export", "exportable"]
 LIMIT_PX = 1.0
 # Corners that are as good as all of them to fit a formula to.
 ENOUGH_CORNERS = 4000
+# Which lens is nearest is plain before the last digits, which only that one needs.
+ROUGH_OPTIONS = Options(tolerance=1e-5)
 
 
 class Exportable(NamedTuple):
@@ -109,6 +112,7 @@ def export(
         CalibrationError: no lens of the tool sees as far from the axis.
     """
     record = record_of(tool)
+    _check_suffix(record, Path(path))
     camera = source if isinstance(source, Camera) else source.camera
     made_from = source if isinstance(source, Calibration) else None
     held = exportable(camera, tool, made_from=made_from)
@@ -130,6 +134,19 @@ def export(
     for place, content in files.items():
         write_bytes(place, content.encode() if isinstance(content, str) else content)
     return Exported(record, held, tuple(files))
+
+
+def _check_suffix(record: Format, path: Path) -> None:
+    """The suffix says which of a tool's files is meant.
+
+    Raises:
+        InputError: the tool has several and this is none of them.
+    """
+    if path.suffix and len(record.suffixes) > 1 and path.suffix.lower() not in record.suffixes:
+        raise InputError(
+            f"{path} does not say which file of {record.title} is meant; expected a name that ends in"
+            f" {' or '.join(record.suffixes)}. Name it so."
+        )
 
 
 def exportable(camera: Camera, tool: str, *, made_from: Calibration | None = None) -> Exportable:
@@ -169,25 +186,28 @@ def _nearest(camera: Camera, rays: Float[ndarray, "n 3"], record: Format) -> tup
         focal = (*focal, "skew")
     fy = frame.fy if record.two_focals else frame.fx
     plain = replace(camera, intrinsics=Intrinsics(frame.fx, fy, frame.cx, frame.cy, skew), lens_frame=None)
-    near: list[tuple[float, Camera, Holding]] = []
+    near: list[tuple[float, Camera, Pairs]] = []
     for text in record.lenses:
         kind, free = parse_lens(text)
         starts = [replace(plain, lens=kind(**start)) for start in kind.starts]
         try:
-            other = fit_pairs(about_principal_point(rays, wanted, (*focal, *free)), starts).unknowns
+            problem = about_principal_point(rays, wanted, (*focal, *free))
+            other = fit_pairs(problem, starts, options=ROUGH_OPTIONS).unknowns
         except CalibrationError:
             continue
-        other = other.with_unit_scale()
-        holding = record.holding(other.lens)
-        if holding and np.isfinite(apart := ((other.project(rays) - wanted) ** 2).sum()):
-            near.append((float(apart), other, holding))
+        apart = ((other.project(rays) - wanted) ** 2).sum()
+        if np.isfinite(apart) and record.holding(other.with_unit_scale().lens):
+            near.append((float(apart), other, problem))
     if not near:
         raise CalibrationError(
             f"none of {', '.join(record.lenses)} sees as far from the axis as this camera does. Use a tool"
             f" with a"
             " lens of the angle."
         )
-    _, other, holding = min(near, key=lambda entry: entry[0])
+    _, other, problem = min(near, key=lambda entry: entry[0])
+    other = fit_pairs(problem, [other]).unknowns.with_unit_scale()
+    holding = record.holding(other.lens)
+    assert holding is not None, "it was held before the last steps"
     return other, holding
 
 

@@ -20,7 +20,7 @@ import math
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, number
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.lenses import Brown, Pfet
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 __all__ = ["LENSFUN"]
 

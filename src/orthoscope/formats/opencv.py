@@ -11,8 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-from xml.etree.ElementTree import Element
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +20,9 @@ from orthoscope.formats.syntax import Document, matrix, number, whole_number, ya
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.opencv_order import OPENCV_ORDER
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 __all__ = ["OPENCV"]
 

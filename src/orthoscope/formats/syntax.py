@@ -15,14 +15,16 @@ import re
 from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from orthoscope.files.whole_files import read_bytes
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.models.camera import LARGEST_SIDE
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 __all__ = ["Document", "json_number", "matrix", "number", "numbers", "whole_number", "yaml_list"]
 
@@ -76,8 +78,10 @@ class Document:
         return _yaml(re.sub(r"\A%YAML:1\.0[^\n]*\n", "", text))
 
     @cached_property
-    def xml(self) -> ElementTree.Element | None:
+    def xml(self) -> Element | None:
         """The root of the file's XML; entities of its own are refused."""
+        from xml.etree import ElementTree
+
         if self._is_too_large or b"<" not in self.content[:512] or b"<!ENTITY" in self.content:
             return None
         try:

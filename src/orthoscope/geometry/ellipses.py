@@ -33,6 +33,10 @@ class Ellipses(NamedTuple):
     centres: Float[ndarray, "n 2"]
     axes: Float[ndarray, "n 2 2"]
 
+    def of(self, which: ndarray) -> Ellipses:
+        """Those of some."""
+        return Ellipses(self.centres[which], self.axes[which])
+
 
 def fit_ellipses(rims: Float[ndarray, "n k 2"]) -> Ellipses:
     """The ellipse through each row of points.

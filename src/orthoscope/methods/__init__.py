@@ -7,10 +7,9 @@ takes one method.
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import inspect
 from collections import UserDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Literal, Unpack, get_origin, get_type_hints, overload
 
 from orthoscope.fitting.calibration import Calibration
@@ -37,13 +36,32 @@ KINDS_OF_VALUES = {str: "a word", bool: "true or false", int: "a whole number", 
 class _Methods(UserDict[str, Any]):
     """Functions by name; what stands in the table is the function, or the name of its file until it is asked
     for.
+
+    Methods of other packages are looked for when a name is none of ours, or all are asked for.
     """
 
     def __getitem__(self, name: str) -> Callable[..., Calibration]:
+        if name not in self:
+            raise KeyError(name)
         if isinstance(self.data[name], str):
             module, _, attribute = self.data[name].partition(":")
             self.data[name] = getattr(importlib.import_module(module), attribute or name)
         return self.data[name]
+
+    def __contains__(self, name: object) -> bool:
+        if name not in self.data:
+            self._look_for_others()
+        return name in self.data
+
+    def __iter__(self) -> Iterator[str]:
+        self._look_for_others()
+        return iter(self.data)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def _look_for_others(self) -> None:
+        self.data |= {name: value for name, value in _of_others().items() if name not in self.data}
 
 
 METHODS = _Methods(
@@ -65,11 +83,9 @@ def _of_others() -> dict[str, str]:
     They are functions like these here; where the attribute has another name than the entry, it is the entry's
     that counts.
     """
-    found = importlib.metadata.entry_points(group="orthoscope.methods")
-    return {entry.name: entry.value for entry in found if entry.name not in METHODS.data}
+    from importlib.metadata import entry_points
 
-
-METHODS.data.update(_of_others())
+    return {entry.name: entry.value for entry in entry_points(group="orthoscope.methods")}
 
 
 @overload

@@ -316,12 +316,14 @@ class Formula(Lens):
 
     Attributes:
         starts: coefficients from which a fit may have to start to find its minimum.
+        several_minima: whether a calibration has a minimum near more than one of them, each to be tried.
     """
 
     chart: ClassVar[Chart]  # type: ignore[misc]
     radially_symmetric: ClassVar[bool]  # type: ignore[misc]
     free: ClassVar[tuple[str, ...]]  # type: ignore[misc]
     starts: ClassVar[tuple[dict[str, float], ...]] = ({},)
+    several_minima: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         frozen(

@@ -1,6 +1,6 @@
 """`LENSES`, the table of lenses by name that everything else goes by, and the descriptions that users give.
 
-The formulas are in decentred_lenses.py and radial_lenses.py.
+The formulas are in decentred_lenses.py, radial_lenses.py and sphere_lenses.py.
 """
 
 from __future__ import annotations
@@ -10,12 +10,15 @@ from orthoscope.models.decentred_lenses import Brown, Rational
 from orthoscope.models.free_lens import FreeLens
 from orthoscope.models.lens import Formula, Lens
 from orthoscope.models.radial_lenses import Division, Fet, Fov, KannalaBrandt, Pfet, Stereographic
+from orthoscope.models.sphere_lenses import DoubleSphere, Eucm
 
 __all__ = [
     "FREE",
     "LENSES",
     "Brown",
     "Division",
+    "DoubleSphere",
+    "Eucm",
     "Fet",
     "Fov",
     "KannalaBrandt",
@@ -40,6 +43,8 @@ LENSES: dict[str, type[Formula]] = {
     "division": Division,
     "kannala_brandt": KannalaBrandt,
     "stereographic": Stereographic,
+    "double_sphere": DoubleSphere,
+    "eucm": Eucm,
 }
 
 

@@ -115,8 +115,12 @@ def _points(*, half_way: bool = False) -> Float[ndarray, " n"]:
 
 def _weights(t: Float[ndarray, " m"]) -> Float[ndarray, "m n"]:
     """What the values at the N points weigh in the polynomial at each t of [0, 1]."""
-    powers = np.polynomial.chebyshev.chebvander
-    return powers(2.0 * t - 1.0, N - 1) @ np.linalg.inv(powers(2.0 * _points() - 1.0, N - 1))
+    return _chebyshev(t) @ np.linalg.inv(_chebyshev(_points()))
+
+
+def _chebyshev(t: Float[ndarray, " m"]) -> Float[ndarray, "m n"]:
+    """The N polynomials of Chebyshev at each t of [0, 1]."""
+    return np.cos(np.arange(N) * np.arccos(np.clip(2.0 * t - 1.0, -1.0, 1.0))[:, None])
 
 
 def _grid(x: ndarray, y: ndarray) -> ndarray:

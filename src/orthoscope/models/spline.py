@@ -28,8 +28,11 @@ PIECE_WEIGHTS = (
     np.array([[1.0, -3.0, 3.0, -1.0], [4.0, 0.0, -6.0, 3.0], [1.0, 3.0, 3.0, -3.0], [0.0, 0.0, 0.0, 1.0]]).T
     / 6.0
 )
-# So many nodes of Gauss and Legendre are exact for the squares of cubics.
-NODE_COUNT = 4
+# Four nodes of Gauss and Legendre between -1 and 1, exact for the squares of cubics.
+NODES = np.array([-1.0, -1.0, 1.0, 1.0])
+NODES *= np.sqrt(3.0 / 7.0 + 2.0 / 7.0 * np.sqrt(1.2) * np.array([1.0, -1.0, -1.0, 1.0]))
+# The nodes' weights.
+NODE_WEIGHTS = 0.5 + np.sqrt(30.0) / 36.0 * np.array([-1.0, 1.0, 1.0, -1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,13 +162,13 @@ class Displacement:
 
 def _grams(splines: int, step: float) -> tuple[ndarray, ndarray, ndarray]:
     """Integrals over the lattice's cells of products of two splines, of slopes, of second derivatives."""
-    nodes, shares = np.polynomial.legendre.leggauss(NODE_COUNT)
-    powers = np.vander(0.5 * (nodes + 1.0), 4, increasing=True)
-    grams = []
+    powers = np.vander(0.5 * (NODES + 1.0), 4, increasing=True)
+    grams, derived = [], PIECE_WEIGHTS
     for order in range(3):
-        derived = np.polynomial.polynomial.polyder(PIECE_WEIGHTS, order)
+        if order:
+            derived = np.arange(1, len(derived))[:, None] * derived[1:]
         values = powers[:, : len(derived)] @ derived / step**order
-        piece = values.T @ (0.5 * step * shares[:, None] * values)
+        piece = values.T @ (0.5 * step * NODE_WEIGHTS[:, None] * values)
         gram = np.zeros((splines, splines))
         for first in range(splines - SPLINES_ACROSS_CELL + 1):
             gram[first : first + SPLINES_ACROSS_CELL, first : first + SPLINES_ACROSS_CELL] += piece

@@ -47,10 +47,13 @@ NOTES = (
         " than two of these."
     ),
     (
-        "Rms is per point: the root of the mean of |e|², as OpenCV prints it. NCE, of held-out photographs: 1"
-        " is what rounding to whole pixels alone would give."
+        "Rms is per point: the root of the mean of |e|², as OpenCV prints it. NCE, the normalized calibration"
+        " error, of held-out photographs: 1 is what rounding to whole pixels alone would give."
     ),
-    "A camera's file stays as it is: it used none of these photographs; only the board's poses are fitted.",
+    (
+        "A camera's file stays as it is; only the board's poses are fitted. Where it was made from these very"
+        " photographs, its error is not that of unseen ones."
+    ),
     (
         "Parameters: how many of camera and target shape the data determined; not a whole number where priors"
         " shared in it. Lens, target: what it came to with all photographs; time, of that one calibration."

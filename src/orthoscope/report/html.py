@@ -6,11 +6,12 @@ would take a sixth of a second of every calibration to be loaded and compiled.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from html import escape
 from typing import Any
 
-__all__ = ["Content", "Html", "raw", "table", "tag"]
+__all__ = ["Content", "Html", "raw", "table", "tag", "unbroken"]
 
 # These elements hold nothing.
 VOID_ELEMENTS = frozenset({"br", "img", "input", "meta", "wbr"})
@@ -56,6 +57,11 @@ def table(
     ]
     head = [tag("th", heading, scope="col") for heading in headings]
     return tag("table", tag("thead", tag("tr", head)) if head else None, tag("tbody", body), class_=class_)
+
+
+def unbroken(text: str) -> str:
+    """Text whose numbers stay on one line with their units and errors."""
+    return re.sub(r"(?<=[\d±]) (?=[±%\d]|px\b|mm\b)|(?<=\b[cf][xy]) (?=\d)", "\N{NO-BREAK SPACE}", text)
 
 
 def _quoted(value: str) -> str:

@@ -12,8 +12,9 @@ from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.geometry.numbers import ABSENT, pixels
 from orthoscope.report import tables
 from orthoscope.report.data.views import suspects_of
+from orthoscope.report.drawn_corners import drawn_corners
 from orthoscope.report.headline import headline, next_steps
-from orthoscope.report.html import Html, table, tag
+from orthoscope.report.html import Html, table, tag, unbroken
 from orthoscope.report.panels import PANELS
 from orthoscope.report.pictures import Pictures
 from orthoscope.report.shape import shape_rows
@@ -61,7 +62,7 @@ def opening(evaluation: Evaluation) -> Html:
     return tag(
         "header",
         tag("p", "orthoscope · calibration report", class_="kicker"),
-        tag("h1", grade, " ", tag("span", told.sentence)),
+        tag("h1", grade, " ", tag("span", unbroken(told.sentence))),
         tag("p", told.limit, class_="limit") if told.limit else None,
         tag("p", facts, class_="facts"),
         class_=f"grade-{told.look}",
@@ -118,7 +119,7 @@ def _camera(evaluation: Evaluation) -> Html:
     return tag(
         "div",
         tag("h2", "K and lens"),
-        tag("p", tables.camera_line(evaluation.calibration), class_="camera-line"),
+        tag("p", unbroken(tables.camera_line(evaluation.calibration)), class_="camera-line"),
         tag(
             "div",
             tag("div", tabs, role="tablist", aria_label="Camera for"),
@@ -177,10 +178,14 @@ def what_to_know(evaluation: Evaluation) -> Html | None:
 
 def photographs_section(evaluation: Evaluation, pictures: Pictures) -> Html:
     """Each photograph with its errors; opened, with corners and residuals; a switch takes it out."""
-    shots = []
+    shots, detections = [], evaluation.calibration.detections
     for row in tables.view_rows(evaluation):
         uri = pictures.small.get(row.image)
-        picture = tag("img", src=uri, alt="", loading="lazy") if uri else tag("span", class_="no-picture")
+        picture = (
+            tag("img", src=uri, alt="", loading="lazy")
+            if uri
+            else drawn_corners(detections.views[row.number - 1], detections.image_size)
+        )
         shots.append(
             tag(
                 "li",
@@ -210,9 +215,19 @@ def photographs_section(evaluation: Evaluation, pictures: Pictures) -> Html:
             "Open one to see its corners where they were found and where the camera predicts them.",
             class_="note",
         ),
+        _not_shown(len(shots) - len(pictures.small)),
         tag("ol", shots, class_="shots"),
         class_="panel",
     )
+
+
+def _not_shown(views: int) -> Html | None:
+    """What stands for photographs that are not shown, and how to have them shown."""
+    if views <= 0:
+        return None
+    words = "Corners alone stand for a frame of a film, and for a photograph that was not at hand:"
+    command = tag("code", "orthoscope report calibration.json --photos PHOTOS")
+    return tag("p", f"{words} ", command, " shows it.", class_="note")
 
 
 def _opener(row: tables.ViewRow, picture: Html) -> Html:

@@ -22,6 +22,7 @@ import cv2
 from orthoscope.files.sensor_frames import mark_turned, open_film, quarter_turns
 from orthoscope.files.whole_files import check_not_onto
 from orthoscope.geometry.arrays import InputError, ndarray
+from orthoscope.geometry.cores import at_once
 from orthoscope.models.camera import Camera
 from orthoscope.straight.film_av import has_pyav, straighten_film
 from orthoscope.straight.undistort import Straightener
@@ -74,7 +75,7 @@ def undistort_video(
     straightener = Straightener(camera, keep=keep, view=view)
     if has_pyav():
         return _with_pyav(straightener, path, place, executor=executor, progress=progress)
-    with nullcontext(executor) if executor else ThreadPoolExecutor() as run, _Source(path) as source:
+    with nullcontext(executor) if executor else ThreadPoolExecutor(at_once()) as run, _Source(path) as source:
         rate, total = source.get(cv2.CAP_PROP_FPS), int(source.get(cv2.CAP_PROP_FRAME_COUNT))
         usual = rate if 0 < rate < 1e4 else USUAL_RATE
         with _Film(place, usual, straightener, quarters=quarter_turns(path)) as film:
@@ -103,7 +104,7 @@ def _with_pyav(
     part = _part_of(place)
     size = straightener.view.image_size
     try:
-        with nullcontext(executor) if executor else ThreadPoolExecutor() as run:
+        with nullcontext(executor) if executor else ThreadPoolExecutor(at_once()) as run:
             done = straighten_film(path, part, straightener, size=size, executor=run, progress=progress)
         if not done:
             raise InputError(

@@ -26,6 +26,7 @@ from orthoscope.files.whole_files import check_not_onto, write_bytes
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.models.camera import Camera
+from orthoscope.models.image_size import check_image_size
 from orthoscope.straight.picture_files import encoded, read_picture
 from orthoscope.straight.views import View, map_of, straight_camera
 
@@ -78,12 +79,7 @@ class Straightener:
             InputError: the photograph is not of the camera's size.
         """
         size = (image.shape[1], image.shape[0])
-        if size != tuple(self.camera.image_size):
-            width, height = self.camera.image_size
-            raise InputError(
-                f"the photograph is {size[0]}x{size[1]}; this camera was calibrated at {width}x{height}. Hand"
-                " in photographs of that size."
-            )
+        check_image_size(self.camera, size)
         if image.dtype != np.uint8 or image.shape[2:] != (3,):
             return self._mapped(image)
         wide = self._spare.picture("wide", size, 4)

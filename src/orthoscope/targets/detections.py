@@ -50,9 +50,9 @@ class View:
     def __post_init__(self) -> None:
         ids = frozen(self.ids, (None,), f"view {self.image!r}: ids", dtype=np.int64)
         pixels = frozen(self.pixels, (len(ids), 2), f"view {self.image!r}: pixels")
-        values, counts = np.unique(ids, return_counts=True)
-        if (counts > 1).any():
-            corner = int(values[counts > 1][0])
+        ordered = np.sort(ids)
+        if (again := ordered[1:] == ordered[:-1]).any():
+            corner = int(ordered[1:][again][0])
             raise InputError(
                 f"view {self.image!r} has corner {corner} more than once; expected each once. Drop the"
                 " repeats."
@@ -72,10 +72,10 @@ class SetAside(NamedTuple):
 
 
 class Remark(NamedTuple):
-    """What a person should know of how a photograph was seen, though it takes part.
+    """What a person should know of how a photograph was seen, though it takes part, or of a target.
 
     Attributes:
-        image: the photograph's name.
+        image: the photograph's name, or the target's.
         words: a sentence without its full stop.
     """
 

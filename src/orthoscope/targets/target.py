@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Float, InputError, Int, frozen, ndarray
+from orthoscope.geometry.arrays import Float, InputError, Int, frozen, median, ndarray
 from orthoscope.targets.board import Board
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.drawing import Drawing
@@ -191,6 +191,6 @@ def _board_on(grid: tuple[int, int], points: ndarray) -> Board | None:
     columns, rows = grid
     steps = np.hypot(*np.diff(points.reshape(rows, columns, 3)[..., :2], axis=1).reshape(-1, 2).T)
     try:
-        return Chessboard(columns, rows, float(np.median(steps)))
+        return Chessboard(columns, rows, median(steps))
     except InputError:
         return None

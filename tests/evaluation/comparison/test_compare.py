@@ -96,6 +96,7 @@ def test_the_best_is_first_and_loses_nothing(comparison):
     assert all(standing.loses_px > 0 for standing in comparison.standings[1:])
 
 
+@pytest.mark.slow
 def test_each_error_is_that_of_the_judge_for_the_same_folds(comparison):
     best = comparison.standings[0]
     unseen = held_out(TEN, partial(fccm, lens="brown"))
@@ -274,7 +275,7 @@ def told_of(*standings: Standing) -> tuple[str, ...]:
 
 def test_the_next_one_is_told_with_what_it_loses():
     assert told_of(standing("decoupled", 0.1234), standing("fccm:brown", 0.19, loses=(0.067, 0.006))) == (
-        "decoupled foresees these photographs best: 0.123 ± 0.010 px on those that were not used.",
+        "decoupled predicts these photographs best: 0.123 ± 0.010 px on those that were not used.",
         "The next, fccm:brown, loses 0.0670 ± 0.0060 px.",
     )
 
@@ -304,7 +305,7 @@ def test_one_that_fits_best_what_was_used_and_loses_elsewhere_has_learnt_it():
 
 def test_one_alone_is_not_called_the_best():
     assert told_of(standing("a", 0.12)) == (
-        "a foresees these photographs with 0.120 ± 0.010 px on those that were not used.",
+        "a predicts these photographs with 0.120 ± 0.010 px on those that were not used.",
     )
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.stats import f as oracle
+from scipy.special import fdtrc
 
 from orthoscope.evaluation.misfit.f_distribution import f_survival
 
@@ -18,7 +18,7 @@ def test_it_is_scipys_from_the_body_to_the_far_tail(a: float, b: float):
     f = np.array([0.01, 0.5, 0.9, 1.0, 1.05, 1.3, 3.0, 20.0])
     ours = [f_survival(value, a, b) for value in f]
     assert_allclose(
-        ours, oracle.sf(f, a, b), rtol=1e-8, atol=1e-290
+        ours, fdtrc(a, b, f), rtol=1e-8, atol=1e-290
     )  # differences of logarithms of gamma, each about 1e6, keep 9 digits
 
 

@@ -79,6 +79,7 @@ def test_on_calibrel_it_chooses_the_shape_of_the_target_by_itself(calibrel: Cali
     assert smooth > 2.0 * free  # 0.30
 
 
+@pytest.mark.slow
 def test_on_calibrel_a_flat_target_moves_the_principal_point_by_seventy_pixels(calibrel: Calibration):
     flat = fccm(calibrel.detections, lens="brown")
     K, of_flat = calibrel.camera.intrinsics, flat.camera.intrinsics
@@ -89,6 +90,7 @@ def test_on_calibrel_a_flat_target_moves_the_principal_point_by_seventy_pixels(c
     )  # which the flat camera has no idea of
 
 
+@pytest.mark.slow
 def test_on_calibrel_both_halves_of_the_photographs_find_the_same_shape(calibrel: Calibration):
     detections = calibrel.detections
     halves = [

@@ -38,6 +38,7 @@ def test_three_streets_tell_the_lens_within_a_pixel_over_the_frame(name):
     assert 0.05 < found.rms_px < 0.12  # the noise of an edge, not of what is bent in space
 
 
+@pytest.mark.slow
 def test_what_is_bent_in_space_is_left_out():
     """Nine facades' edges in ten are taken, of cables and crowns next to none."""
     truth = street_camera(BARREL)
@@ -71,6 +72,7 @@ def test_the_division_model_is_linear_in_an_edge():
     assert_allclose(division_of_edges(edges, SIZE), -0.4 * (unit / 520.0) ** 2, rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.datasets
 def test_the_edges_of_a_board_alone_give_the_image_of_the_full_calibration(datasets):
     """Within half a pixel wherever corners were seen; the calibration has the corners, this one no target."""

@@ -39,7 +39,7 @@ def disc_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
                 which, places = numbered(found)
                 layout = _layout(places) if len(which) >= FEWEST_DISCS else None
                 if layout and len(which) > best[0]:
-                    discs = refined_discs(picture, Ellipses(found.centres[which], found.axes[which]))
+                    discs = refined_discs(picture, Ellipses(found.centres[which], found.axes[which])).ellipses
                     best = len(which), layout, _diameter(discs, places)
             if best[0]:
                 seen[best[1]] += 1

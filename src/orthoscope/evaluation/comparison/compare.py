@@ -31,6 +31,7 @@ from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import METHODS, calibrate
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.camera import Camera
+from orthoscope.models.image_size import of_another_size
 from orthoscope.models.lenses import lens_name
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
@@ -211,11 +212,8 @@ def _calibrated(entry: Entry, used: Detections, clock: Callable[[], float]) -> S
 
 def _given(entry: Entry, camera: Camera, used: Detections, squares: Float[ndarray, " m"]) -> Standing:
     """The standing of a camera from elsewhere, before it is judged."""
-    if tuple(camera.image_size) != tuple(used.image_size):
-        (width, height), (w, h) = camera.image_size, used.image_size
-        return Standing(
-            entry, squares, failure=f"it is a camera of {width}x{height} pixels; the photographs have {w}x{h}"
-        )
+    if told := of_another_size(camera, used.image_size):
+        return Standing(entry, squares, failure=told)
     flat = TargetShape("flat", np.zeros_like(used.target.points))
     return Standing(entry, squares, camera, flat, lens_name(camera.lens))
 

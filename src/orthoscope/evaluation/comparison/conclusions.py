@@ -17,7 +17,7 @@ __all__ = ["as_good_as_best", "conclusions"]
 
 
 def conclusions(comparison: Comparison) -> tuple[str, ...]:
-    """Which entry foresees photographs best, which others are as good, what the next one loses, and who
+    """Which entry predicts photographs best, which others are as good, what the next one loses, and who
     learnt what it was shown.
     """
     judged = comparison.judged
@@ -27,7 +27,7 @@ def conclusions(comparison: Comparison) -> tuple[str, ...]:
     worse = [standing for standing in judged[1:] if standing not in as_good]
     alone = len(comparison.standings) == 1
     told = [
-        f"{best.entry.name} foresees these photographs {'with' if alone else 'best:'} {_error(best)} px on"
+        f"{best.entry.name} predicts these photographs {'with' if alone else 'best:'} {_error(best)} px on"
         " those that were not used."
     ]
     if as_good:

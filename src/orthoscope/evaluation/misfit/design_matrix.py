@@ -21,6 +21,8 @@ __all__ = ["Block", "Columns"]
 # An eigenvalue of a pose's scaled system that is no larger is what a view with hardly any corners does not
 # tell.
 LARGEST_OPEN_EIGENVALUE = 1e-14
+# With more rows than this for each index, side by side, each index's own products are quicker.
+ROWS_TOGETHER = 16
 
 
 class Block(NamedTuple):
@@ -135,6 +137,11 @@ def _sums(
     if size == 1:
         return (a.reshape(len(a), -1) @ b.reshape(len(b), -1).T)[:, :, None]
     sums = np.empty((len(a), len(b), size))
+    if len(index) > ROWS_TOGETHER * size and (index[1:] >= index[:-1]).all():
+        for i, rows in enumerate(pairwise(np.searchsorted(index, np.arange(size + 1)))):
+            (a_x, a_y), (b_x, b_y) = (part[:, :, slice(*rows)].transpose(1, 0, 2) for part in (a, b))
+            sums[:, :, i] = a_x @ b_x.T + a_y @ b_y.T
+        return sums
     for i, (a_x, a_y) in enumerate(a):
         for j, (b_x, b_y) in enumerate(b):
             sums[i, j] = np.bincount(index, weights=a_x * b_x + a_y * b_y, minlength=size)

@@ -56,7 +56,7 @@ from orthoscope.evaluation.misfit.f_test import Agreement, MisfitTest, agreement
 from orthoscope.evaluation.misfit.jacobian import Slopes, parameters_of, slopes_of, stepped
 from orthoscope.evaluation.misfit.whitening import Whitening
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.geometry.arrays import Float, Int, ndarray
+from orthoscope.geometry.arrays import Float, Int, median, ndarray
 from orthoscope.geometry.cells import Cells, cells_for
 from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
@@ -160,7 +160,7 @@ def _weights(residual: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
     """1, but where a residual is larger than CLIP_RATIO times the noise; there what makes it that large."""
     size = np.hypot(*residual.T)
     # Rayleigh's median
-    noise = float(np.median(size)) / np.sqrt(2.0 * np.log(2.0)) if len(size) else 0.0
+    noise = median(size) / np.sqrt(2.0 * np.log(2.0)) if len(size) else 0.0
     return np.minimum(1.0, CLIP_RATIO * noise / np.maximum(size, 1e-300))
 
 
@@ -235,7 +235,7 @@ def _cell_residuals(
 def _scale(slopes: Slopes) -> float:
     """Pixels per metre in the target's plane, the middle view's (rms over directions)."""
     return (
-        float(np.sqrt(0.5 * np.median((slopes.by_place[:, :, :2] ** 2).sum((1, 2)))))
+        float(np.sqrt(0.5 * median((slopes.by_place[:, :, :2] ** 2).sum((1, 2)))))
         if len(slopes.view)
         else float("nan")
     )

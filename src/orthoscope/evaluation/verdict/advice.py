@@ -40,7 +40,18 @@ def _of_default(s: Situation) -> bool:
 
 ADVICE: tuple[Advice, ...] = (
     Advice(
-        "few", lambda s: f"Take {15 - s.distinct} more photographs, the target tilted another way in each."
+        "few",
+        lambda s: f"Take {max(3, 15 - s.distinct)} more photographs, the target tilted another way in each.",
+    ),
+    Advice(
+        "unknown",
+        _plain("Calibrate with --method decoupled."),
+        lambda s: not _of_default(s),
+        (("--method", "decoupled"),),
+    ),
+    Advice(
+        "unknown",
+        _plain("Check that the target is what was said and that its corners were found where they are."),
     ),
     Advice(
         "photographs",
@@ -56,6 +67,16 @@ ADVICE: tuple[Advice, ...] = (
         "photographs",
         _plain("Switch stabiliser and cropping off, and take them again."),
         lambda s: s.disagree == "centre",
+    ),
+    Advice(
+        "photographs",
+        _plain("Use photographs of one lens only, as the camera wrote them."),
+        lambda s: s.disagree == "lens",
+    ),
+    Advice(
+        "photographs",
+        _plain("Fix zoom and focus, keep camera and target still, and take them again."),
+        lambda s: s.disagree == "mixed",
     ),
     Advice("photographs", _plain("Put the camera on a stand, keep the target still, and take them again.")),
     Advice(

@@ -8,10 +8,10 @@ have.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import hypot, isnan
+from math import isnan
 from typing import NamedTuple
 
-from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade
+from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade, good_somewhere
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
 from orthoscope.geometry.numbers import rough_pixels
 
@@ -23,8 +23,10 @@ FEWEST_PHOTOGRAPHS = 4
 FEW_VIEWS = 8
 # Photographs with less tilt, degrees, are all frontal.
 LEVEL_DEGREES = 12.0
-# Cameras that differ by less than this share of the corners' noise are as good as one.
-NOTICED_SHARE = 0.5
+# Cameras whose images differ by less than the corners' noise times this are as good as one.
+NOTICED_SHARE = 1.0
+# What cannot be named limits a camera where it makes so much of its error.
+LARGE_SHARE = 0.5
 # Cameras that differ by less, pixels, are one camera for everyone.
 NEGLIGIBLE_DIFFERENCE_PX = 0.05
 # A free lens may miss up to this share of the corners' noise.
@@ -33,8 +35,6 @@ STIFF_SHARE = 0.5
 PART_SHARE = 0.15
 # Chance makes hardly so large a share of the corners wild.
 WILD_SHARE = 0.005
-# With corners in less than this share of the frame's cells, it is corners that are missing.
-SPARSE_SHARE = 0.75
 # A sentence lists so many images.
 NAMED_IMAGES = 3
 # A principal point that is known no better than this share of the image's width is open.
@@ -66,6 +66,12 @@ def listed(images: Sequence[str]) -> str:
 
 
 def _matters(s: Situation) -> bool:
+    """Whether it limits the camera that the photographs differ: a small spread that is certain is in its
+    predicted error anyway.
+    """
+    if s.disagree in ("shutter", "mixed") and not s.groups:
+        part = s.error_px if s.disagree == "shutter" else s.differ_px
+        return s.error_px > FINE_PX and part > LARGE_SHARE * s.error_px
     return bool(s.disagree) and s.differ_px > max(NOTICED_SHARE * s.noise_px, NEGLIGIBLE_DIFFERENCE_PX)
 
 
@@ -80,8 +86,6 @@ def _lens_is_missed(s: Situation) -> bool:
 
 def _of_photographs(s: Situation) -> Grade:
     apart = 2.0 * s.differ_px if s.groups else s.differ_px
-    if s.disagree == "shutter" and not s.groups:  # the camera is one, unless it zoomed and only seems sheared
-        return Grade.GOOD if hypot(s.error_px, s.differ_px) <= FINE_PX else Grade.USABLE
     return Grade.NO if apart > s.coarse_px else Grade.USABLE
 
 
@@ -95,6 +99,8 @@ KINDS = {
         f"{APART}: the image moves on the sensor by about {rough_pixels(s.differ_centre_px)} px"
         " (a stabiliser or cropping)"
     ),
+    "lens": lambda s: f"{APART}: the lens's distortion changes between them (another lens, or straightened)",
+    "mixed": lambda s: "the photographs do not quite agree on one camera",
     # It is one camera all the same.
     "shutter": lambda s: (
         "the photographs were read row by row while camera or target moved (a rolling shutter)"
@@ -110,11 +116,11 @@ def _photographs(s: Situation) -> str:
 
 def _open(s: Situation) -> bool:
     """Whether the camera is not known well enough, and not for lack of corners in some part of the frame."""
-    return s.error_px > FINE_PX or (s.held < WIDE_SHARE and s.covered >= SPARSE_SHARE)
+    return s.error_px > FINE_PX or (s.share < WIDE_SHARE and s.covered >= WIDE_SHARE)
 
 
 def _as_far_as_known(s: Situation) -> Grade:
-    return Grade.USABLE if s.error_px > FINE_PX else Grade.REGION
+    return Grade.REGION if good_somewhere(s) else Grade.USABLE
 
 
 def _as_far_as_it_goes(s: Situation) -> Grade:
@@ -125,9 +131,15 @@ def _as_far_as_it_goes(s: Situation) -> Grade:
 CAUSES: tuple[Cause, ...] = (
     Cause(
         "few",
-        lambda s: s.views < FEWEST_PHOTOGRAPHS or isnan(s.error_px),
+        lambda s: s.views < FEWEST_PHOTOGRAPHS or (isnan(s.error_px) and s.distinct < FEW_VIEWS),
         lambda s: Grade.NO if s.views < 2 or isnan(s.error_px) else Grade.USABLE,
         lambda s: f"{_photograph(s.views)} cannot tell how far off it is",
+    ),
+    Cause(
+        "unknown",
+        lambda s: isnan(s.error_px),
+        lambda s: Grade.NO,
+        lambda s: "no richer camera that it could be compared with can be fitted to these photographs",
     ),
     Cause(
         "lens",
@@ -201,7 +213,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "region",
-        lambda s: s.held < WIDE_SHARE,
+        lambda s: s.share < WIDE_SHARE,
         lambda s: Grade.REGION,
         lambda s: f"too few corners were seen {s.place}",
     ),

@@ -6,19 +6,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.evaluation.coverage import emptiest_place, share_covered
-from orthoscope.evaluation.disagreement import Disagreement
+from orthoscope.evaluation.coverage import emptiest_place
+from orthoscope.evaluation.disagreement import AGREED, Disagreement
 from orthoscope.evaluation.groups import Groups
 from orthoscope.evaluation.misfit.f_test import is_misfit
 from orthoscope.evaluation.misfit.misfit import Misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit
 from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
-from orthoscope.evaluation.verdict.situation import FINE_PX, Situation, coarse_px
+from orthoscope.evaluation.verdict.situation import Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.near_copies import near_copies
+from orthoscope.geometry.arrays import median
 from orthoscope.solve.least_squares import Status
 
-__all__ = ["Findings", "corners_beyond", "share_within", "situation_of"]
+__all__ = ["Findings", "corners_beyond", "situation_of"]
 
 # With no more than this share of the views left without copies, that they agree says nothing.
 DISTINCT_SHARE = 0.7
@@ -35,20 +36,28 @@ class Findings(NamedTuple):
     views: tuple[ViewError, ...]
     misfit: Misfit
     reference: ReferenceFit | None
-    disagreement: Disagreement
-    groups: Groups | None
+
+    @property
+    def disagreement(self) -> Disagreement:
+        """Whether the photographs agree on one camera."""
+        return self.reference.disagreement if self.reference else AGREED
+
+    @property
+    def groups(self) -> Groups | None:
+        """Of photographs of two cameras; None where there is one."""
+        return self.reference.groups if self.reference else None
 
 
 def situation_of(found: Findings) -> Situation:
     """The facts."""
     calibration, reference, disagreement = found.calibration, found.reference, found.disagreement
     detections, settings = calibration.detections, calibration.settings
-    views, distinct = len(detections.views), len(np.unique(near_copies(detections)))
-    larger = _by_copies(reference, views / distinct)
+    views, distinct = len(detections.views), int(near_copies(detections).max(initial=-1)) + 1
+    error = reference.error if reference else None
     target, lens = found.misfit.target, found.misfit.lens
     images = [view.image for view in detections.views]
     known = reference.known if reference else None
-    suspects = suspects_among(found.views, known, detections.target.points)
+    suspects = suspects_among(found.views, reference.of_all if reference else None, detections.target.points)
     wild = _wild(calibration, {image for image, _ in suspects})
     told = distinct > DISTINCT_SHARE * views  # copies agree with each other whatever is true
     return Situation(
@@ -61,12 +70,12 @@ def situation_of(found: Findings) -> Situation:
         views=views,
         distinct=distinct,
         converged=calibration.status == Status.CONVERGED,
-        error_px=_error(reference, disagreement, larger),
-        near_px=_error(reference, disagreement, larger, near=True),
+        error_px=error.seen_px if error else float("nan"),
+        near_px=error.near_seen_px if error else float("nan"),
         centre_sd=_centre_deviation(calibration),
         coarse_px=coarse_px(detections.image_size),
-        share=share_within(reference, larger),
-        covered=share_covered(calibration),
+        share=error.share if error else 0.0,
+        covered=error.seen_share if error else 0.0,
         place=emptiest_place(detections),
         noise_px=float(np.sqrt(2.0 * known.noise)) if known else calibration.rms_px,
         tilt=_tilt(calibration),
@@ -98,47 +107,6 @@ def corners_beyond(calibration: Calibration) -> int:
     return int(np.isnan(calibration.camera.project(seen)[:, 0]).sum())
 
 
-def share_within(reference: ReferenceFit | None, larger: float = 1.0, limit: float = FINE_PX) -> float:
-    """The share of the frame, where the camera has an image, over which its predicted error is below a limit.
-
-    Args:
-        larger: by how much the error is larger than predicted.
-    """
-    if reference is None:
-        return 0.0
-    known = reference.error.far[np.isfinite(reference.error.far)]
-    return float((larger * known <= limit).mean()) if known.size else 0.0
-
-
-def _by_copies(reference: ReferenceFit | None, copies: float) -> float:
-    """By how much the error is larger than predicted, since copies share their errors: what is predicted of
-    errors within views counted each of them, what is predicted by leaving photographs out did not.
-
-    Args:
-        copies: photographs for each that is distinct.
-    """
-    if reference is None:
-        return 1.0
-    error = reference.error
-    return max(1.0, float(np.sqrt(copies)) * error.alike_px / max(error.seen_px, 1e-300))
-
-
-def _error(
-    reference: ReferenceFit | None, disagreement: Disagreement, larger: float, *, near: bool = False
-) -> float:
-    """The camera error: that of the camera, and of how cameras differ from photograph to photograph.
-
-    Args:
-        larger: by how much the first is larger than predicted.
-        near: of things where the target was, else of what is far away.
-    """
-    if reference is None:
-        return float("nan")
-    apart = 0.0 if disagreement.kind == "shutter" else disagreement.by_px
-    own = reference.error.near_seen_px if near else reference.error.seen_px
-    return float(np.hypot(larger * own, apart))
-
-
 def _centre_deviation(calibration: Calibration) -> float:
     """Standard deviation of the principal point along x or y, whichever is larger, over the image's width."""
     deviations = calibration.uncertainty.deviations
@@ -150,7 +118,7 @@ def _wild(calibration: Calibration, suspects: set[str]) -> dict[str, int]:
     photographs that do not belong left aside.
     """
     sizes = [np.hypot(*e.T) for e in calibration.residuals()]
-    limit = max(WILD_FACTOR * float(np.median(np.concatenate(sizes))), WILD_PX)
+    limit = max(WILD_FACTOR * median(np.concatenate(sizes)), WILD_PX)
     views = calibration.detections.views
     return {
         view.image: int((size > limit).sum())

@@ -3,7 +3,8 @@
 A grade is given by how far off the camera is where corners were seen (error_px), and by the share of the
 frame over which it is off by FINE_PX at most and corners were seen.  A camera that is too far off for what is
 far away may still serve where the target was (near_px): there a shift of the camera undoes what the
-photographs leave open.  What is known to be wrong (causes.py) can lower a grade, never raise it.
+photographs leave open; where it is right to a quarter of a pixel there and not far off elsewhere, it is good
+within that region.  What is known to be wrong (causes.py) can lower a grade, never raise it.
 """
 
 from __future__ import annotations
@@ -14,11 +15,15 @@ from typing import NamedTuple
 
 from orthoscope.evaluation.verdict.situation import COARSE_PX, FINE_PX, NEAR_PX, Situation
 
-__all__ = ["GRADES", "WIDE_SHARE", "Grade", "by_error", "lower"]
+__all__ = ["GRADES", "WIDE_SHARE", "Grade", "by_error", "good_somewhere", "lower"]
 
-# A camera holds widely over this share of the frame; what is left is corners of it that a board rarely
-# reaches.
-WIDE_SHARE = 0.7
+# A camera holds widely over this share of the frame: fifteen photographs of a board that is led all over the
+# frame have their corners in 70 % of it, since the board's own margin keeps them from its border.
+WIDE_SHARE = 0.6
+# A camera that is off by no more at the target's distances, pixels, is good there.
+NEAR_FINE_PX = 0.25
+# One that is good there only may be off by no more far away, pixels.
+AWAY_PX = 0.75
 
 
 class Grade(StrEnum):
@@ -41,12 +46,13 @@ GRADES: tuple[_Row, ...] = (
         Grade.GOOD,
         f"off by {FINE_PX:g} px at most where corners were seen: {100 * WIDE_SHARE:.0f} % of the frame or"
         " more",
-        lambda s: s.error_px <= FINE_PX and s.held >= WIDE_SHARE,
+        lambda s: s.error_px <= FINE_PX and s.share >= WIDE_SHARE,
     ),
     _Row(
         Grade.REGION,
-        f"off by {FINE_PX:g} px at most where corners were seen: less of the frame",
-        lambda s: s.error_px <= FINE_PX,
+        f"off by {FINE_PX:g} px at most where corners were seen: less of the frame; or by {NEAR_FINE_PX:g}"
+        f" px at the target's distances, and {AWAY_PX:g} px far away",
+        lambda s: good_somewhere(s),
     ),
     _Row(
         Grade.USABLE,
@@ -56,6 +62,11 @@ GRADES: tuple[_Row, ...] = (
     ),
     _Row(Grade.NO, "off by more than that, or nobody knows by how much", lambda s: True),
 )
+
+
+def good_somewhere(s: Situation) -> bool:
+    """Whether the camera is off by little where corners were seen, far away or where the target was."""
+    return s.error_px <= FINE_PX or (s.near_px <= NEAR_FINE_PX and s.error_px <= AWAY_PX)
 
 
 def by_error(s: Situation) -> Grade:

@@ -35,9 +35,8 @@ class Situation:
         near_px: the same of things where the target was; NaN where nothing says.
         centre_sd: standard deviation of the principal point, as a share of the image's width.
         coarse_px: error above which it is of no use.
-        share: of the frame over which it is off by FINE_PX at most, by what is predicted; where no corners
-            were seen that rests on a formula which nothing has tested.
-        covered: share of the frame's cells that corners were seen in.
+        share: of the frame that lies in the region where it is off by FINE_PX at most, corners around it.
+        covered: share of the frame that lies between corners, however far off the camera is there.
         place: of the frame where corners are missing, in words.
         noise_px: of a found corner, per point.
         tilt: of the target against the line of sight, degrees, in the photograph that has most but one.
@@ -93,11 +92,6 @@ class Situation:
     target_mm: float = 0.0
     suspects: tuple[tuple[str, str], ...] = ()
     precious: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def held(self) -> float:
-        """The share of the frame for which the camera answers: it is off by little, and corners were seen."""
-        return min(self.share, self.covered)
 
 
 NOTHING_KNOWN = Situation(error_px=float("nan"), share=0.0)

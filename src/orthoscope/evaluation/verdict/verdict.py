@@ -11,7 +11,7 @@ from orthoscope.evaluation.verdict.grades import Grade, by_error, lower
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation, coarse_px
 from orthoscope.geometry.numbers import rough_pixels
 
-__all__ = ["Verdict", "far_on_others", "verdict_on"]
+__all__ = ["Verdict", "far_on_others", "grade_on_others", "verdict_on"]
 
 HEADS = {
     Grade.GOOD: "Good",
@@ -60,24 +60,33 @@ def verdict_on(s: Situation) -> Verdict:
     )
 
 
-def far_on_others(rms_px: float, image_size: tuple[int, int]) -> str:
-    """How far off a camera is on photographs that it was not made from, in the words of a verdict.
+def grade_on_others(rms_px: float, image_size: tuple[int, int]) -> Grade:
+    """How far a camera may be trusted by photographs that it was not made from.
 
     Args:
         rms_px: of what is left over after the poses are fitted, per corner; the corners' own noise is in
             it, so the camera is rather nearer.
         image_size: of the camera.
     """
-    grade = by_error(Situation(error_px=rms_px, coarse_px=coarse_px(image_size)))
-    return f"{HEADS[grade]}: off by about {rough_pixels(rms_px)} px where these photographs have corners."
+    return by_error(Situation(error_px=rms_px, coarse_px=coarse_px(image_size)))
+
+
+def far_on_others(rms_px: float, image_size: tuple[int, int]) -> str:
+    """How far off a camera is on such photographs, in the words of a verdict.
+
+    Args:
+        rms_px, image_size: as of `grade_on_others`.
+    """
+    head = HEADS[grade_on_others(rms_px, image_size)]
+    return f"{head}: off by about {rough_pixels(rms_px)} px where these photographs have corners."
 
 
 def _far(grade: Grade, s: Situation) -> str:
     if isnan(s.error_px):
         return f"{HEADS[grade]}: nothing says how far off it is."
-    if grade in (Grade.GOOD, Grade.REGION):
+    if grade in (Grade.GOOD, Grade.REGION) and s.error_px <= FINE_PX:
         seen = f"off by about {rough_pixels(s.error_px)} px where corners were seen"
-        return f"{HEADS[grade]}: {seen}, and by less than {FINE_PX:g} px over {_share(s.held)} of the frame."
+        return f"{HEADS[grade]}: {seen}, and by less than {FINE_PX:g} px over {_share(s.share)} of the frame."
     if s.near_px <= NEARER_SHARE * s.error_px:
         near = f"off by about {rough_pixels(s.near_px)} px at the distances where the target was"
         return f"{HEADS[grade]}: {near}, by {rough_pixels(s.error_px)} px far away."

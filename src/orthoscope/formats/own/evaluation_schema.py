@@ -107,6 +107,8 @@ class CameraErrorFile(FileStruct):
     near: list[list[Number]]
     region: list[tuple[float, float]]
     without_px: list[Number] = []
+    share: Number = None
+    seen_share: Number = None
 
     @classmethod
     def of(cls, error: CameraError) -> CameraErrorFile:

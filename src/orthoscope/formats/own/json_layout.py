@@ -65,6 +65,22 @@ def _line(value: Any) -> str:
 
 
 def _table(value: Any) -> str:
-    """The same as `_line`, sooner for many numbers."""
+    """The same as `_line`, sooner for many numbers: only rows that Python writes in another way are left to
+    it.
+    """
     text = msgspec.json.encode(value).decode()
-    return _line(value) if any(sign in text for sign in OTHERWISE) else text.replace(",", ", ")
+    if not _is_otherwise(text):
+        return text.replace(",", ", ")
+    rows = text[2:-2].split("],[")
+    plain = '"' not in text and "{" not in text and not text.startswith("[[[") and text.endswith("]]")
+    if not plain or len(rows) != len(value):
+        return _line(value)
+    written = [
+        _line(entries) if _is_otherwise(row) else f"[{row.replace(',', ', ')}]"
+        for row, entries in zip(rows, value, strict=True)
+    ]
+    return f"[{', '.join(written)}]"
+
+
+def _is_otherwise(text: str) -> bool:
+    return any(sign in text for sign in OTHERWISE)

@@ -93,6 +93,9 @@ class Kept:
     Args:
         detections, skew, flats: as of `Compared`.
         cold: fits that started from nothing, of `some_of` the views.
+
+    Attributes:
+        of_some: the same of `some_of` the views; itself where these are all.
     """
 
     def __init__(
@@ -104,16 +107,22 @@ class Kept:
         cold: Mapping[Model, StepOneFit] | None = None,
     ) -> None:
         some, flats = some_of(detections), flats or {}
-        self._all, self._cold = some is detections, cold or {}
+        self.detections, self._cold = detections, dict(cold or {})
         self.flat = _flats(detections, skew, flats)
-        self._flat_of_some = self.flat if self._all else _flats(some, skew, flats)
+        self.of_some = self if some is detections else Kept(some, skew=skew, flats=flats, cold=cold)
 
     def step_one(self, model: Model) -> StepOneFit:
         """Some of the views first, then all."""
-        cold = self._cold.get(model) or _fit(self._flat_of_some(model.base), model, None)
-        if self._all:
+        cold = self.of_some.cold(model)
+        if self.of_some is self:
             return polished(cold)
         return fit_step_one(self.flat(model.base), shape=model.shape, first_lens=model.first_lens, near=cold)
+
+    def cold(self, model: Model) -> StepOneFit:
+        """From nothing, and ended early."""
+        if model not in self._cold:
+            self._cold[model] = _fit(self.flat(model.base), model, None)
+        return self._cold[model]
 
 
 def _flats(

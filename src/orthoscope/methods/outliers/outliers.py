@@ -27,7 +27,7 @@ from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.observations import Observations, Poses
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
-from orthoscope.geometry.arrays import Bool, CalibrationError, Float, Int, ndarray
+from orthoscope.geometry.arrays import Bool, CalibrationError, Float, Int, median, ndarray
 from orthoscope.methods.fccm import fit_flat
 from orthoscope.methods.outliers.residual_tests import (
     LEAST_HARM,
@@ -108,9 +108,7 @@ def _order(observations: Observations, points: Float[ndarray, "p 3"]) -> _Order:
     square = _squares(trend.values, present)
     share = trend.typical / square
     near = (present > 0) & (trend.misses <= np.maximum(FAR_OFF_RATIO * trend.typical, 0.5 * square)[:, None])
-    return _Order(
-        near, trend.typical, share > min(max(DISORDER_SHARE, DISORDER_RATIO * float(np.median(share))), 1.0)
-    )
+    return _Order(near, trend.typical, share > min(max(DISORDER_SHARE, DISORDER_RATIO * median(share)), 1.0))
 
 
 def _squares(places: Float[ndarray, "m n 2"], present: Float[ndarray, "m n"]) -> Float[ndarray, " m"]:

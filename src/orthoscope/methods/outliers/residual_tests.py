@@ -21,7 +21,7 @@ import numpy as np
 
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
-from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 from orthoscope.methods.outliers.systematic import by_target, cells_of, thirds_of_groups
 from orthoscope.methods.outliers.view_polynomial import DOUBTED_WEIGHT, local_misses, medians, trends
 
@@ -119,7 +119,7 @@ def noise_of(sizes: Float[ndarray, "m n"], corners: Bool[ndarray, "m n"]) -> flo
         sizes: |residual| of all corners, (m,n) pixels.
         corners: those that count, (m,n).
     """
-    return float(np.median(medians(sizes, corners.astype(float)))) / MEDIAN_SIZE
+    return median(medians(sizes, corners.astype(float))) / MEDIAN_SIZE
 
 
 def _off(

@@ -106,9 +106,11 @@ def local_misses(
         (m,n); 0 for corners that are not doubted.
     """
     rows, columns = np.nonzero(doubted)
-    wanted, which = np.unique(ids[doubted], return_inverse=True)
+    asked = np.zeros(len(points), dtype=bool)
+    asked[ids[doubted]] = True
+    wanted, which = np.flatnonzero(asked), (np.cumsum(asked) - 1)[ids[doubted]]
     apart = ((points[wanted, None, :2] - points[None, :, :2]) ** 2).sum(-1)
-    near = np.argsort(apart, axis=1, kind="stable")[which.ravel(), : NEIGHBOUR_COUNT + 1]  # itself first
+    near = np.argsort(apart, axis=1, kind="stable")[which, : NEIGHBOUR_COUNT + 1]  # itself first
     column_of = np.full((len(ids), len(points)), -1)
     seen = np.nonzero(ids >= 0)
     column_of[seen[0], ids[seen]] = seen[1]

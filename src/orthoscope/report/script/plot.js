@@ -141,7 +141,7 @@ class Plot {
     const inner = width - m.l - m.r;
     const range = this.range();
     const high = this.equal
-      ? clamp(inner * Math.abs((range.y[1] - range.y[0]) / (range.x[1] - range.x[0])), 140, 560)
+      ? clamp(inner * Math.abs((range.y[1] - range.y[0]) / (range.x[1] - range.x[0])), 140, this.tallest())
       : this.height(inner);
     const height = Math.round(high + m.t + m.b),
       dpr = Math.min(3, devicePixelRatio || 1);
@@ -169,6 +169,10 @@ class Plot {
     this.atX = p => x[0] + ((p - box.x) / box.w) * (x[1] - x[0]);
     this.atY = p => y[0] + ((p - box.y) / box.h) * (y[1] - y[0]);
     this.shown = { x, y };
+  }
+  /* how tall a figure to scale may be */
+  tallest() {
+    return 560;
   }
   height(inner) {
     return clamp(0.55 * inner, 180, 300);

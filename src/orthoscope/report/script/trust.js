@@ -18,6 +18,8 @@ function trust() {
     ...overFrame,
     margin: { l: 8, r: 8, t: 40, b: 8 },
     labels: null,
+    /* what stands above it and below: the map is seen whole without scrolling */
+    tallest: () => clamp(innerHeight - 290, 240, 560),
     paint: p => {
       const g = p.ctx,
         x = p.X(-0.5),
@@ -52,7 +54,7 @@ function trust() {
       g.textAlign = "left";
       g.textBaseline = "bottom";
       g.fillStyle = css("--soft");
-      g.fillText(`within the line: ${px(d.limit)} or less`, p.box.x, p.box.y - 6);
+      g.fillText(`within the line: ${short(d.limit)} px or less`, p.box.x, p.box.y - 6);
     },
     find: (p, x, y) => {
       const u = p.atX(x),

@@ -1,0 +1,254 @@
+"""Rendered photographs of every kind of target, good and poor ones: is a corner ever where none is?
+
+    python -m benchmarks.studies.false_corners                           400 photographs
+    python -m benchmarks.studies.false_corners --count 10000 --seed 1    others, and more of them
+    python -m benchmarks.studies.false_corners --verbose                 a line for each false corner
+
+Photographs are 640x480, by a lens `brown` and a fisheye in turn; sharp, usual and poor ones (`QUALITIES`);
+tilts to 65 degrees; boards fill a quarter of the picture to all of it, one in four stands over its rim, one
+in eight has something grey over a part of it. A false corner is more than 1 px from where its id is, in the
+best of the ways in which the board looks the same; for discs, from the middle of the outline. Ids are wrong
+where most corners of a photograph are false.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from functools import cache
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from orthoscope.detection.sight import Sight
+from orthoscope.detection.table import see
+from orthoscope.fitting.disc_centres import disc_offsets
+from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
+from orthoscope.geometry.pose import Pose
+from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.simulation.render import BLACK_LEVEL, WHITE_LEVEL, Renderer
+from orthoscope.simulation.scene import random_views
+from orthoscope.targets.table import parse_target
+from orthoscope.targets.target import Target
+
+__all__ = ["BOARDS", "Shown", "errors_of", "photographs"]
+
+BOARDS = (
+    "chessboard:9x6:25mm",
+    "chessboard:8x6:25mm",
+    "chessboard:14x9:20mm",
+    "marked:14x9:20mm",
+    "marked:9x6:25mm:DICT_4X4_50:18mm",
+    "charuco:7x5:30mm:22mm:DICT_5X5_100",
+    "charuco:10x8:25mm:18mm:DICT_4X4_50:legacy",
+    "aprilgrid:6x6:88mm:0.3",
+    "aprilgrid:4x3:50mm:0.25",
+    "aruco:5x4:40mm:10mm:DICT_4X4_50",
+    "circles:4x11:20mm:asymmetric",
+    "circles:9x7:20mm:symmetric:10mm",
+)
+CAMERAS = (
+    Camera((640, 480), Intrinsics(560.0, 559.0, 323.0, 237.0), Brown(k1=-0.22, k2=0.06)),
+    Camera((640, 480), Intrinsics(260.0, 260.0, 319.0, 241.0), KannalaBrandt(k1=-0.02)),
+)
+
+
+class Quality(NamedTuple):
+    """Ranges of what makes a photograph good or poor: blur, px; noise and contrast, grey levels."""
+
+    blurs: tuple[float, ...]
+    noise: tuple[float, float]
+    contrast: tuple[float, float]
+
+
+QUALITIES = {
+    "sharp": Quality((0.3, 0.5, 0.7), (0.0, 1.5), (150.0, 185.0)),
+    "usual": Quality((0.6, 0.8, 1.0, 1.2), (1.5, 3.5), (90.0, 185.0)),
+    "poor": Quality((0.5, 1.0, 1.5, 2.0, 2.5, 3.0), (2.0, 8.0), (15.0, 150.0)),
+}
+STEEPEST = np.deg2rad(65.0)
+FILLS = (0.25, 0.95)
+OVER_RIM, COVERED = 4, 8
+FALSE_PX = 1.0
+
+
+class Shown(NamedTuple):
+    """A photograph: its number, target and quality, how it was taken, and where corners truly are."""
+
+    number: int
+    target: Target
+    quality: str
+    told: str
+    picture: ndarray
+    truth: Float[ndarray, "m 2"]
+
+
+@cache
+def _renderer(camera: int, blur: float) -> Renderer:
+    return Renderer(CAMERAS[camera], blur_px=blur, noise=0.0)
+
+
+@cache
+def _target(spec: str) -> Target:
+    return parse_target(spec)
+
+
+def photographs(count: int, *, seed: int = 0, first: int = 0) -> Iterator[Shown]:
+    """So many photographs; a number's is the same whatever the count."""
+    for number in range(first, first + count):
+        shown = _photograph(number, np.random.default_rng([seed, number]))
+        if shown:
+            yield shown
+
+
+def _photograph(number: int, rng: np.random.Generator) -> Shown | None:
+    target = _target(BOARDS[number % len(BOARDS)])
+    which, name = int(rng.integers(2)), list(QUALITIES)[int(rng.integers(len(QUALITIES)))]
+    quality, camera = QUALITIES[name], CAMERAS[which]
+    blur, noise = float(rng.choice(quality.blurs)), float(rng.uniform(*quality.noise))
+    contrast = float(rng.uniform(*quality.contrast))
+    fill = float(np.exp(rng.uniform(*np.log(FILLS))))
+    tilt, whole = float(rng.uniform(0.0, STEEPEST)), bool(rng.integers(OVER_RIM))
+    drawing = target.drawing()
+    ends = np.abs([drawing.low - target.points.min(0)[:2], drawing.high - target.points.max(0)[:2]])
+    try:
+        (pose,) = random_views(
+            camera,
+            target,
+            1,
+            rng=rng,
+            tilt=(tilt, tilt),
+            fill=(fill, fill),
+            whole=whole,
+            margin=float(np.max(ends)),
+        )
+    except CalibrationError:  # a wide board, tilted so, does not fill so much
+        return None
+    plain = _renderer(which, blur).photograph(target, pose, rng=rng).astype(float)
+    dull = 110.0 + (plain - 110.0) * contrast / (WHITE_LEVEL - BLACK_LEVEL)
+    truth = _truth(camera, target, pose)
+    covered = not rng.integers(COVERED)
+    if covered:
+        dull = _covered(dull, truth, blur, rng)
+    picture = np.clip(np.rint(dull + rng.normal(0.0, noise, dull.shape)), 0, 255).astype(np.uint8)
+    told = (
+        f"{'fisheye' if which else 'brown'} blur {blur:g} noise {noise:.1f} contrast {contrast:.0f}"
+        f" fill {fill:.2f} tilt {np.rad2deg(tilt):.0f}{'' if whole else ' over the rim'}"
+        f"{' covered' if covered else ''}"
+    )
+    return Shown(number, target, name, told, picture, truth)
+
+
+def _truth(camera: Camera, target: Target, pose: Pose) -> Float[ndarray, "m 2"]:
+    truth = camera.project(pose.apply(target.points))
+    if target.disc_radii.any():
+        truth = truth + disc_offsets(camera, pose, target.points, target.disc_radii)
+    return truth
+
+
+def _covered(
+    picture: Float[ndarray, "h w"], truth: Float[ndarray, "m 2"], blur: float, rng: np.random.Generator
+) -> Float[ndarray, "h w"]:
+    """The picture with an even ellipse over a part of the board."""
+    inside = truth[np.isfinite(truth).all(1)]
+    size = np.ptp(inside, axis=0)
+    middle = inside[rng.integers(len(inside))] + rng.normal(0.0, 0.1, 2) * size
+    mask = np.zeros(picture.shape, np.float32)
+    axes = np.maximum(rng.uniform(0.08, 0.3, 2) * size, 3.0)
+    cv2.ellipse(
+        mask,
+        tuple(int(one) for one in middle),
+        tuple(int(one) for one in axes),
+        float(rng.uniform(0, 180)),
+        0,
+        360,
+        1.0,
+        -1,
+    )
+    mask = cv2.GaussianBlur(mask, (0, 0), blur)
+    return picture * (1.0 - mask) + float(rng.uniform(30, 200)) * mask
+
+
+def errors_of(shown: Shown, sight: Sight) -> Float[ndarray, " n"]:
+    """How far each corner is from where its id is, px, in the best of the ways in which the board looks the
+    same.
+    """
+    ways = [np.arange(len(shown.truth)), *shown.target.symmetries()]
+    off = [np.hypot(*(shown.truth[way[sight.ids]] - sight.pixels).T) for way in ways]
+    return min((np.where(np.isfinite(one), one, np.inf) for one in off), key=np.median)
+
+
+class _Tally:
+    """What photographs of one board, or of all, came to."""
+
+    def __init__(self) -> None:
+        self.photographs = self.found = self.corners = self.shown = 0
+        self.false = self.with_false = self.wrong_ids = 0
+        self.worst, self.square, self.seconds = 0.0, 0.0, 0.0
+
+    def add(self, shown: Shown, errors: Float[ndarray, " n"], seconds: float) -> None:
+        width, height = shown.picture.shape[::-1]
+        self.photographs, self.found = self.photographs + 1, self.found + (len(errors) > 0)
+        self.corners, self.seconds = self.corners + len(errors), self.seconds + seconds
+        self.shown += int(((shown.truth > 2) & (shown.truth < [width - 3, height - 3])).all(1).sum())
+        false = int((errors > FALSE_PX).sum())
+        wrong = len(errors) > 0 and false > 0.5 * len(errors)
+        self.wrong_ids += wrong
+        self.false, self.with_false = self.false + false, self.with_false + (false > 0)
+        if not wrong:
+            self.worst = max(self.worst, float(errors.max(initial=0.0)))
+            self.square += float((errors**2).sum())
+
+    def row(self, name: str) -> str:
+        """As a row of a table."""
+        rms = np.sqrt(self.square / max(self.corners, 1))
+        return (
+            f"| {name} | {self.photographs} | {self.found} | {self.corners} of {self.shown} | {rms:.3f} |"
+            f" {self.worst:.2f} | {self.false} in {self.with_false} | {self.wrong_ids} |"
+            f" {1e3 * self.seconds / max(self.photographs, 1):.0f} ms |"
+        )
+
+
+def main() -> None:
+    """What the module's docstring says."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=int, default=400)
+    parser.add_argument("--first", type=int, default=0, help="the number of the first")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--verbose", action="store_true", help="a line for each photograph with false corners"
+    )
+    given = parser.parse_args()
+    cv2.setNumThreads(1)
+    tallies: dict[str, _Tally] = {}
+    for shown in photographs(given.count, seed=given.seed, first=given.first):
+        before = time.process_time()
+        sight = see(shown.picture, shown.target)
+        seconds = time.process_time() - before
+        errors = errors_of(shown, sight) if isinstance(sight, Sight) else np.zeros(0)
+        for name in (f"`{shown.target.name}`", shown.quality, "all"):
+            tallies.setdefault(name, _Tally()).add(shown, errors, seconds)
+        if given.verbose and (errors > FALSE_PX).any():
+            off = ", ".join(f"{error:.1f}" for error in np.sort(errors[errors > FALSE_PX])[::-1][:6])
+            print(
+                f"  {shown.number}: {(errors > FALSE_PX).sum()} of {len(errors)} ({off} px)"
+                f" {shown.target.name} {shown.quality} {shown.told}",
+                flush=True,
+            )
+    print(
+        "| target | photographs | found | corners of those in the picture | rms, px | worst, px |"
+        " false corners, in photographs | ids wrong | time |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name in [*(f"`{_target(spec).name}`" for spec in BOARDS), *QUALITIES, "all"]:
+        if name in tallies:
+            print(tallies[name].row(name))
+
+
+if __name__ == "__main__":
+    main()
