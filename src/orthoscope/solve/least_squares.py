@@ -46,6 +46,8 @@ MOST_DAMPING = 1e12
 LARGEST_OPEN_EIGENVALUE = 1e-14
 # Views are eliminated so many numbers at a time (16 MB).
 NUMBERS_AT_ONCE = 1 << 21
+# Blocks of more unknowns are not inverted.
+WIDEST_INVERTED = 32
 # An unknown that has at least this share (squared) in such a direction is open too.
 OPEN_SHARE = 1e-8
 
@@ -299,18 +301,49 @@ def _lowered(sums: NormalEquations, promised: float) -> NormalEquations:
 def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndarray, ndarray, float]:
     """Shared step, view steps and what the quadratic model promises to take off the cost; NaN for no step."""
     of_shared, of_views = damping * _weights(sums.A, damp), damping * _weights(sums.C, damp)
+    C = sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2])
     try:
-        roots = inverse_roots(sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2]))
-        inverse = roots @ roots.transpose(0, 2, 1)
-        by_views = (inverse @ sums.c[:, :, None])[:, :, 0]
-        system = eliminated(sums, roots)
+        system, by_views, carried = (_with_solved if C.shape[2] > WIDEST_INVERTED else _with_inverted)(
+            sums, C
+        )
         system[np.diag_indices_from(system)] += of_shared
         shared = -np.linalg.solve(system, sums.a - np.einsum("mkp,mp->k", sums.B, by_views))
     except np.linalg.LinAlgError:  # singular as far as numbers go
         return np.zeros_like(sums.a), np.zeros_like(sums.c), float("nan")
-    views = -(inverse @ (sums.c + shared @ sums.B)[:, :, None])[:, :, 0]
+    views = -by_views - carried(shared)
     damped = of_shared @ shared**2 + (of_views * views**2).sum()
     return shared, views, float(-(sums.a @ shared) - (sums.c * views).sum() + damped)
+
+
+def _with_inverted(
+    sums: NormalEquations, C: Float[ndarray, "m p p"]
+) -> tuple[ndarray, ndarray, Callable[[ndarray], ndarray]]:
+    """The shared system, C^-1 c, and what takes a shared step s to C^-1 B' s, by the inverse of each block.
+
+    Raises:
+        LinAlgError: a block is not positive, as far as numbers go.
+    """
+    roots = inverse_roots(C)
+    inverse = roots @ roots.transpose(0, 2, 1)
+
+    def of_block(right: ndarray) -> ndarray:
+        return (inverse @ right[:, :, None])[:, :, 0]
+
+    return eliminated(sums, roots), of_block(sums.c), lambda shared: of_block(shared @ sums.B)
+
+
+def _with_solved(
+    sums: NormalEquations, C: Float[ndarray, "m p p"]
+) -> tuple[ndarray, ndarray, Callable[[ndarray], ndarray]]:
+    """The same for wide blocks, of which an inverse takes several times the work that a few solutions take.
+
+    Raises:
+        LinAlgError: a block is not positive, as far as numbers go.
+    """
+    np.linalg.cholesky(C)
+    solved = np.linalg.solve(C, np.concatenate([sums.c[:, :, None], sums.B.transpose(0, 2, 1)], axis=2))
+    by_views, of_shared = solved[:, :, 0], solved[:, :, 1:]
+    return sums.A - (sums.B @ of_shared).sum(0), by_views, lambda shared: of_shared @ shared
 
 
 def eliminated(sums: NormalEquations, roots: Float[ndarray, "m p p"]) -> Float[ndarray, "k k"]:
