@@ -65,7 +65,7 @@ MOST_UNEXPLAINED = 0.03
 # of the square of the contrast.
 LOCAL_MODULES, MOST_LOCALLY_UNEXPLAINED = 1.5, 0.0015
 # Of a good corner the standard deviation is less than this, pixels.
-WIDEST_SPREAD = 0.22
+WIDEST_SPREAD = 0.19
 
 
 class FittedMarkers(NamedTuple):

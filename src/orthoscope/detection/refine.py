@@ -43,7 +43,7 @@ SADDLE_MEAN_SQUARE = 0.6
 FARTHEST_SHARE = 0.35
 # Of a sure corner the standard deviation is less than this, pixels: it is within a pixel then, as good as
 # always.
-WIDEST_SPREAD = 0.22
+WIDEST_SPREAD = 0.19
 # The edges of a sure corner are off the lattice's lines by less than this, radians.
 WIDEST_TURN = 0.4
 # A sure corner has more than this share of the usual contrast.
