@@ -33,6 +33,8 @@ MOST_ANGLE = 0.35
 DIRECTION_STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
 # At most this share of the discs found has no place on the board.
 MOST_MISSING_SHARE = 0.12
+# Where the discs found reach over the whole board, at most this share has no place: something covers them.
+MOST_COVERED_SHARE = 0.5
 # Another way to lay the board is as good when it misses no more than this share of a shorter side's discs.
 RIVAL_SHARE = 0.5
 # At most so many spots join the lattice by chance.
@@ -146,12 +148,24 @@ def laid_on(
                 if (ids < 0).sum() <= MOST_SPOTS_OFF_BOARD and (ids >= 0).sum() >= 4:
                     ways.append(ids)
     missing = np.array([_missing(board, discs, ids, shape) for ids in ways])
-    if not len(ways) or missing.min() > MOST_MISSING_SHARE * len(places):
+    if not len(ways):
+        return np.full(len(places), -1), False
+    allowed = MOST_COVERED_SHARE if _reaches_over(board, ways[int(missing.argmin())]) else MOST_MISSING_SHARE
+    if missing.min() > allowed * len(places):
         return np.full(len(places), -1), False
     off = np.array([(ids < 0).sum() for ids in ways])
     most = missing.min() + RIVAL_SHARE * min(board.columns, board.rows)
     good = [ways[i] for i in np.flatnonzero((missing <= most) & (off <= off[missing.argmin()]))]
     return _of_same(board, discs, good)
+
+
+def _reaches_over(board: Circles, ids: Int[ndarray, " n"]) -> bool:
+    """Whether discs are seen of the board's first and last row and column, and of it at least half: it can
+    then lie in one way only, whatever a hand covers of it.
+    """
+    row, column = np.divmod(ids[ids >= 0], board.columns)
+    ends = row.min() == 0, row.max() == board.rows - 1, column.min() == 0, column.max() == board.columns - 1
+    return all(ends) and (ids >= 0).all() and 2 * len(ids) >= board.columns * board.rows
 
 
 def _of_same(board: Circles, discs: Ellipses, ways: list[ndarray]) -> tuple[Int[ndarray, " n"], bool]:

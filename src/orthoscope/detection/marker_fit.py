@@ -8,8 +8,9 @@ picture is
     I(x) = c + g.x + b M(x),      M(x) = blurred P(H^-1(x + d(x))),    d a polynomial of third order
 
 d moves, stretches and bends: a lens bends the marker. Gauss-Newton on d's twenty numbers and the blur (what
-blur does is the Laplacian of M), with b, c and g beside them. What noise alone would bend is held back as far
-as lenses hardly bend so much. The corner is where x + d(x) is H's corner.
+blur does is the Laplacian of M), with b, c and g beside them, and with |grad M|: ink that bled, a camera's
+curve and white that is clipped make all that is black larger or smaller. What noise alone would bend is held
+back as far as lenses hardly bend so much. The corner is where x + d(x) is H's corner.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy as np
 
 from orthoscope.detection.markers import homography_of
 from orthoscope.detection.noise import noise_variance
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, median, ndarray
 
 __all__ = ["FittedMarkers", "fit_markers"]
 
@@ -95,14 +96,16 @@ def fit_markers(
         height, width = (side // shrink for side in grey.shape)
         part = grey[: height * shrink, : width * shrink]
         small = cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA) if shrink > 1 else grey
-        blur = FIRST_BLUR
+        blur, fits = FIRST_BLUR, {}
         for number in np.flatnonzero(shrinks == shrink):
             start = (corners[number] + 0.5) / shrink - 0.5
             fit = _Fit(small, start, drawings[number], GAP_SHARE * min(gap, 1.0 / GAP_SHARE), blur)
             if fit.settle():
-                fine[number] = (fit.corners + 0.5) * shrink - 0.5
-                good[number] = fit.like(noise / shrink**2) & (fit.spread() * shrink < WIDEST_SPREAD)
-                blur = fit.blur
+                fits[number], blur = fit, fit.blur
+        usual = median(np.array([fit.noise for fit in fits.values()])) if fits else 0.0
+        for number, fit in fits.items():
+            fine[number] = (fit.corners + 0.5) * shrink - 0.5
+            good[number] = fit.like(max(noise / shrink**2, usual)) & (fit.spread() * shrink < WIDEST_SPREAD)
     return FittedMarkers(fine, good)
 
 
@@ -176,10 +179,14 @@ class _Fit:
     def _step(self) -> bool:
         """One step of Gauss-Newton; whether it could be made."""
         model, count = self._drawn(), len(POWERS)
-        columns = np.empty((2 * count + 5, len(self._values)), np.float32)
-        for first, way in ((0, (1, 0)), (count, (0, 1))):
-            slope = cv2.Scharr(model, cv2.CV_32F, *way, scale=1.0 / 32.0)
-            np.multiply(slope.take(self._inside), self._basis_inside, out=columns[first : first + count])
+        columns = np.empty((2 * count + 6, len(self._values)), np.float32)
+        slopes = [
+            cv2.Scharr(model, cv2.CV_32F, *way, scale=1.0 / 32.0).take(self._inside)
+            for way in ((1, 0), (0, 1))
+        ]
+        for first, slope in zip((0, count), slopes, strict=True):
+            np.multiply(slope, self._basis_inside, out=columns[first : first + count])
+        columns[-6] = np.hypot(*slopes)
         columns[-5] = cv2.Laplacian(model, cv2.CV_32F, ksize=1).take(self._inside)
         columns[-2], columns[-1] = model.take(self._inside), 1.0
         np.multiply(self._basis_inside[1:3], columns[-2] + np.float32(self._dark), out=columns[-4:-2])
