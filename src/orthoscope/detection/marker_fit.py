@@ -60,6 +60,9 @@ POWERS = np.array([(i - j, j) for i in range(4) for j in range(i + 1)])
 STRAIGHT = 3
 # Light changes over half a marker by about this share of the contrast.
 USUAL_LIGHT = 0.1
+# Edges are all moved outwards by more than about this, pixels, only where the picture says so in spite of its
+# noise.
+USUAL_SHIFT = 0.015
 # At most this share of the picture's variance is neither noise nor explained, or something else is there.
 MOST_UNEXPLAINED = 0.03
 # What is usually left, by a coarse compression as by noise, counts as noise where so many markers say it, up
@@ -197,6 +200,7 @@ class _Fit:
         # what the bend was before counts, too: as a whole it is held to nothing, by as much as there is noise
         held = 1e-7 * np.diag(normal) + 1e-9
         held[: 2 * count] += self.noise / np.maximum(self._usual_bends * abs(self.contrast), 1e-6) ** 2
+        held[-6] += self.noise / max(USUAL_SHIFT * abs(self.contrast), 1e-6) ** 2
         held[-4:-2] += self.noise / max(USUAL_LIGHT * abs(self.contrast), 1e-6) ** 2
         wanted = np.zeros(len(held))
         wanted[: 2 * count] = np.where(
