@@ -26,6 +26,7 @@ def test_corners_found_before_are_of_no_other_target(run, corners, tmp_path, spe
     assert not (tmp_path / "camera").exists() or not list((tmp_path / "camera").iterdir())
 
 
+@pytest.mark.slow
 def test_a_camera_is_judged_on_corners_that_know_their_target(run, scene, corners, tmp_path):
     export(scene.camera, tmp_path / "camera.yaml", "opencv")
     told = run("evaluate", tmp_path / "camera.yaml", "--on", corners)
@@ -33,6 +34,7 @@ def test_a_camera_is_judged_on_corners_that_know_their_target(run, scene, corner
     assert told.out.startswith("verdict    Good")
 
 
+@pytest.mark.slow
 def test_a_film_is_calibrated_from_and_straightened_in_one_command(run, photos, tmp_path):
     pictures = [cv2.imread(str(path)) for path in sorted(photos.glob("*.png"))]
     height, width = pictures[0].shape[:2]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from orthoscope.files.images import write_image
 from orthoscope.formats.own.json import load
@@ -16,6 +17,7 @@ CAMERA = Camera((640, 480), Intrinsics(600.0, 600.0, 320.0, 240.0), Brown())
 SPECS = "chessboard:6x5:25mm", "charuco:6x6:25mm:18mm:DICT_5X5_100"
 
 
+@pytest.mark.slow
 def test_each_target_that_is_named_has_a_view_of_each_photograph_and_a_part_in_the_camera(run, tmp_path):
     boards, renderer = [parse_target(spec) for spec in SPECS], Renderer(CAMERA)
     for number in range(4):

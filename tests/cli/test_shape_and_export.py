@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from helpers.quick import first_quick
 from orthoscope.formats.load import load_camera
 from orthoscope.formats.own.json import load_calibration
 from orthoscope.models.difference import image_difference
@@ -39,7 +40,7 @@ def calibrate(run, calibrated, tmp_path):
     return runner
 
 
-@pytest.mark.parametrize("shape", ["flat", "smooth", "free"])
+@pytest.mark.parametrize("shape", first_quick(["free", "flat", "smooth"]))
 def test_the_shape_that_is_asked_for_is_the_one_that_is_estimated(calibrate, shape):
     told, out = calibrate("--shape", shape, "--lens", "free")
     assert told.code == 0, told.err
@@ -76,6 +77,7 @@ def test_for_a_tool_a_lens_that_it_has_is_chosen_and_written(calibrate):
     assert "camera-opencv.yaml" in told.out
 
 
+@pytest.mark.slow
 def test_of_a_free_lens_the_nearest_formula_is_written_for_the_tool(calibrate):
     told, out = calibrate("--shape", "flat", "--lens", "free", "--export", "opencv")
     assert told.code == 0, told.err
@@ -104,6 +106,7 @@ def test_the_export_verb_says_what_a_formula_instead_of_the_free_lens_costs(run,
     assert (tmp_path / "camera.yaml").exists()
 
 
+@pytest.mark.slow
 def test_of_a_formula_the_export_verb_has_nothing_to_say_but_what_it_wrote(run, calibrate, tmp_path):
     _, out = calibrate("--shape", "flat", "--lens", "brown")
     told = run("export", out / "calibration.json", "--to", "opencv", "-o", tmp_path / "camera.yaml")

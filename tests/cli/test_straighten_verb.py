@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
+from benchmarks.studies.streets import street_camera, street_photograph
 
-from helpers.streets import street_camera, street_photograph
 from orthoscope.files.images import write_image
 from orthoscope.formats.load import load_camera
 from orthoscope.models.lenses import Brown
 
 
+@pytest.mark.slow
 def test_it_writes_straight_pictures_their_camera_and_the_lens(run, tmp_path):
     truth, rng = street_camera(Brown(k1=-0.28, k2=0.08)), np.random.default_rng(0)
     for name in ("a", "b"):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from helpers.quick import first_quick
 from helpers.target_laws import every_board
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import DETECTORS, see
@@ -23,6 +24,7 @@ from orthoscope.targets.target import target_of
 BROWN = Camera((800, 600), Intrinsics(700.0, 698.0, 404.0, 296.0), Brown(k1=-0.25, k2=0.08))
 FISHEYE = Camera((800, 600), Intrinsics(330.0, 330.0, 400.0, 300.0), KannalaBrandt(k1=-0.02))
 BROWNS, FISHEYES = Renderer(BROWN), Renderer(FISHEYE)  # a renderer keeps its camera's rays
+LOOKS = {"once": (BROWNS, 1), "brown": (BROWNS, 3), "fisheye": (FISHEYES, 3)}
 MOST_OFF = 1.0  # px: a corner farther from the truth is another corner
 FOUND = (
     0.95  # of the corners around which a whole step is in the picture; all but a few at the rim of a fisheye
@@ -59,13 +61,11 @@ def test_every_kind_has_a_detector():
 
 
 @every_board
-@pytest.mark.parametrize(
-    "renderer", [BROWNS, pytest.param(FISHEYES, marks=pytest.mark.slow)], ids=["brown", "fisheye"]
-)
-def test_a_board_is_found_whole_with_its_ids_at_any_roll_and_tilt(board, renderer):
+@pytest.mark.parametrize(("renderer", "photographs"), first_quick(LOOKS))
+def test_a_board_is_found_whole_with_its_ids_at_any_roll_and_tilt(board, renderer, photographs):
     target, rng = target_of(board), np.random.default_rng(3)
     views = random_views(
-        renderer.camera, target, 3, rng=rng, tilt=(0.0, 0.9), fill=(0.6, 0.9), margin=margin(target)
+        renderer.camera, target, photographs, rng=rng, tilt=(0.0, 0.9), fill=(0.6, 0.9), margin=margin(target)
     )
     for i, pose in enumerate(views):
         sight, truth = seen(renderer, target, pose, i)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from helpers.quick import first_quick
 from orthoscope.detection.detect import detect
 from orthoscope.evaluation.evaluate import evaluate
 from orthoscope.formats.own.json import load, save
@@ -58,7 +59,7 @@ def side_by_side(target, turn: float) -> list[tuple]:
     return stands
 
 
-@pytest.mark.parametrize("name", APART.values(), ids=APART)
+@pytest.mark.parametrize("name", first_quick(APART))
 def test_each_of_several_targets_in_a_photograph_is_found_with_its_own_ids(name):
     target = parse_target(name)
     stands = side_by_side(target, 0.2)
@@ -127,6 +128,7 @@ def test_full_calibration_finds_the_camera_from_several_targets(simulated, tmp_p
     assert json.loads((tmp_path / "calibration.json").read_text())["detections"]["target"]["members"]
 
 
+@pytest.mark.slow
 def test_the_default_method_estimates_the_shape_of_each_target(simulated):
     """The second board is curled by two millimetres, the first is flat; only their poses tie them."""
     part = simulated.target.parts[1]

@@ -52,7 +52,9 @@ def test_a_function_and_a_method_with_settings_are_named_by_with():
     assert own_entry("huber=fccm:loss=huber").settings == {"loss": "huber"}
 
 
-@pytest.mark.parametrize("text", ["nowhere.at_all:f", "json:no_such", "json", "json:__name__", "fccm:nolens"])
+@pytest.mark.parametrize(
+    "text", ["nowhere.at_all:f", "json:no_such", "json", "json:__name__", "fccm:nolens", "=fccm:brown", ""]
+)
 def test_what_is_no_method_is_refused(text):
     with pytest.raises(InputError):
         own_entry(text)
@@ -65,6 +67,7 @@ def test_what_a_function_of_ones_own_raises_is_an_outcome_with_its_kind():
         trial_judged(PAPER[0]._replace(settings={"lens": "none"}), data)
 
 
+@pytest.mark.slow
 def test_one_figure_alone_has_its_own_file_and_ones_own_method_in_it():
     plan = replace(FEW, only=("fig4",), own=(PaperEntry("mine", three_coefficients, {}),))
     made = documents(run(plan))

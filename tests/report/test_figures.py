@@ -209,6 +209,7 @@ def test_a_name_is_no_formula_and_has_nothing_unseen():
     assert r"$\frac{a}$\x1b\n.png" in to_svg(figure, "f")
 
 
+@pytest.mark.slow
 def test_figures_for_a_paper_are_written_as_svg_and_pdf_the_same_every_time(ordinary, tmp_path, monkeypatch):
     monkeypatch.setattr(plates, "PLATES", plates.PLATES[:1])
     for folder in ("a", "b"):

@@ -123,6 +123,16 @@ def test_a_page_with_photographs_shows_each_small_and_one_before_and_after(ordin
     page = Page(report_page(ordinary, pictures=pictures))
     assert sum(place.startswith("data:image/jpeg") for place in page.fetched) == len(views) + 2
     assert f"Before and after: {pictures.large[0]}" in "".join(page.words)
+    assert "svg" not in page.tags
+    assert "--photos" not in "".join(page.words)
+
+
+def test_a_photograph_that_is_not_at_hand_has_its_corners_drawn_and_the_page_says_how_it_is_shown(ordinary):
+    text = report_page(ordinary)
+    page, first = Page(text), ordinary.calibration.detections.views[0].pixels[0]
+    assert page.tags.count("svg") == len(ordinary.calibration.detections.views)
+    assert f"M{round(first[0])} {round(first[1])}h0" in text
+    assert "orthoscope report calibration.json --photos PHOTOS" in "".join(page.words)
 
 
 def test_photographs_that_cannot_be_read_or_have_another_size_are_not_shown(ordinary, photograph, tmp_path):
@@ -290,6 +300,12 @@ def test_a_target_whose_shape_was_estimated_has_its_table_and_its_figure_and_a_f
     assert rows["shape"] == "every corner its own place"
     assert rows["out of the plane, lowest to highest"] == "3.98 mm"  # 2 (1 - cos 3)
     assert shape_rows(replace(shaped.calibration, target_shape=TargetShape.flat(54))) == []
+
+
+def test_the_line_on_the_map_is_said_to_hold_what_the_region_holds(pages, ordinary):
+    assert f"Within the line, {100 * ordinary.error.share:.0f} % of the frame" in " ".join(
+        Page(pages["ordinary"]).words
+    )
 
 
 def test_what_was_tried_is_told_with_what_it_loses(pages, shaped):

@@ -239,6 +239,7 @@ def test_photographs_are_one_for_each_view_by_name():
     assert all(image.shape == (160, 200) and image.dtype == np.uint8 for image in made.values())
 
 
+@pytest.mark.slow
 def test_the_demo_shows_a_detector_its_board():
     scene = demo_scene()
     assert scene.target.grid == (14, 9)

@@ -28,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.evaluation.region import (
+    MARGIN_SHARE,
     REGION_DIRECTIONS,
     REGION_STEPS,
     between,
@@ -67,8 +68,8 @@ class CameraError:
             at its own distance, since a shift of the camera undoes less where distances differ; over the
             frame at the typical one.
         model_px, alike_px, views_px, bias_px: over the seen part, far away, what makes it up: independent
-            errors of corners with the priors' scatter; these with errors alike within a view; the jackknife
-            over views with the priors' scatter; what a poorer model misses.
+            errors of corners alone; these with errors alike within a view and the priors' scatter; the
+            jackknife over views with the priors' scatter; what a poorer model misses.
         distance: of the target, metres, in the typical view.
         far, near: (rows, columns) over the frame, row by row, at the cells' centres; NaN where the camera has
             no image.
@@ -136,7 +137,7 @@ class _Variances:
         # rays may have lengths of their own: places along them, in units of the distance
         slopes = _settled(scatter, rays, fitted, distance)
         self.fitted = fitted
-        self.model, self.alike = _spread(slopes[:fitted], scatter.model), _spread(slopes, scatter.alike)
+        self.model, self.alike = _spread(slopes[:fitted], scatter.repeated), _spread(slopes, scatter.alike)
         self.alike *= given.copies
         by_view = slopes @ scatter.left_out.T  # (n, 2, m)
         self.moved = (by_view**2).sum(1)  # (n, m)
@@ -235,7 +236,8 @@ def predicted_error(
     seen_px, model_px, alike_px, views_px, bias_px = far.parts
     along = np.sqrt(far.total[part_frame.stop :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
     corners = seen if corners is None else corners
-    region = grown(middle, ways, along, FINE_PX, seen=corners)
+    margin = MARGIN_SHARE * max(width, height)
+    region = grown(middle, ways, along, FINE_PX, seen=corners, margin=margin)
     imaged = _within_cells(np.isfinite(far.total[part_frame]), width, height)
     return CameraError(
         seen_px=seen_px,
@@ -252,7 +254,7 @@ def predicted_error(
         limit_px=FINE_PX,
         region=region,
         share=float(inside(region, imaged).mean()),
-        seen_share=float(between(corners, imaged).mean()),
+        seen_share=float(between(corners, imaged, margin).mean()),
         without_px=np.sqrt(far.moved[part_seen].mean(0)),
     )
 

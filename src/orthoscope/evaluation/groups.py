@@ -49,6 +49,10 @@ LEAST_LOG_RATIO = 2.5
 CERTAIN_LIKELIHOOD = 0.95
 # The linear step must explain this share of the squared residuals before fits are worth their time.
 LEAST_EXPLAINED_SHARE = 0.3
+# A grouping that leaves more than this share of it at first does not come below that by single views.
+HOPELESS_SHARE = 0.7
+# After so many groupings without hope no other is tried: they come in the order of what the linear step says.
+HOPELESS_GROUPINGS = 3
 # A group has at least this many views: with fewer, none can be left out.
 FEWEST_GROUP_VIEWS = 4
 # K-means starts from so many groupings that are drawn at random.
@@ -112,7 +116,7 @@ def two_groups(
     joint = float(np.nansum(whole.squares))
     starts = [each for _, each in groupings[:REFINED_GROUPINGS]] if explained > LEAST_EXPLAINED_SHARE else []
     together = fit_flat(detections, lens=base) if starts else None
-    squares, second = _best_refined(together, starts) if together else (np.inf, None)
+    squares, second = _best_refined(together, starts, joint) if together else (np.inf, None)
     if together and second is not None and np.sqrt(squares / joint) < APART_SHARE:
         if not _agree_by_themselves(together, second):
             return None
@@ -203,18 +207,23 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
 
 
 def _best_refined(
-    together: Calibration, starts: list[Bool[ndarray, " m"]]
+    together: Calibration, starts: list[Bool[ndarray, " m"]], joint: float
 ) -> tuple[float, Bool[ndarray, " m"] | None]:
-    """The refined grouping with the least squares; no more starts where two have come to it.
+    """The refined grouping with the least squares; no more starts where two have come to it, or some are
+    without hope.
 
     A grouping in which some photographs have changed places can be far better than one camera for all and
     still be the wrong one: refining moves single views, and does not undo a swap.
     """
     best: tuple[float, ndarray | None] = (np.inf, None)
+    hopeless = 0
     for start in starts:
-        refined = _refined(together, start)
+        refined = _refined(together, start, joint)
         if refined is None:
             continue
+        hopeless += refined[0] > HOPELESS_SHARE**2 * joint
+        if hopeless >= HOPELESS_GROUPINGS:
+            break
         if best[1] is not None and len(np.unique(refined[1] ^ best[1])) == 1:
             break  # another start ends where the best one did
         if refined[0] < best[0]:
@@ -233,12 +242,15 @@ def _agree_by_themselves(together: Calibration, second: Bool[ndarray, " m"]) -> 
     return True
 
 
-def _refined(together: Calibration, second: Bool[ndarray, " m"]) -> tuple[float, Bool[ndarray, " m"]] | None:
+def _refined(
+    together: Calibration, second: Bool[ndarray, " m"], joint: float
+) -> tuple[float, Bool[ndarray, " m"]] | None:
     """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no
     camera.
 
     Args:
         together: one camera for all, with a flat target: what each group's fit starts from.
+        joint: the squares of one camera for all; where two leave too much of them, views stay where they are.
     """
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
@@ -256,6 +268,8 @@ def _refined(together: Calibration, second: Bool[ndarray, " m"]) -> tuple[float,
         total = float(np.where(second, squares[1], squares[0]).sum())
         if np.isfinite(total) and (best is None or total < best[0]):
             best = total, second
+        if not total <= HOPELESS_SHARE**2 * joint:
+            break
         second = squares[1] < squares[0]
     return best
 
@@ -264,7 +278,7 @@ def _squares(together: Calibration, group: ndarray) -> Float[ndarray, " m"]:
     """Squared error of each view by a group's camera: left out where it is of the group."""
     detections, fit = together.detections, _fit(together, group)
     shape, camera = fit.shape, fit.estimate.camera
-    poses = resect(camera, detections, shape=shape)
+    poses = resect(camera, detections, shape=shape, near=together.camera_from_target)
     squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
     squares[group] = leave_one_out(linearised(fit)).squares
     return squares

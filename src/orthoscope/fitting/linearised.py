@@ -28,11 +28,10 @@ from orthoscope.fitting.spline_values import SplineValues
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
+from orthoscope.solve.positive import positive_inverse
 
-__all__ = ["ROUNDING_SHARE", "Linearised", "ResidualSlopes", "SharedInverse"]
+__all__ = ["Linearised", "ResidualSlopes", "SharedInverse"]
 
-# This is added to a scaled system's diagonal before it is inverted.
-ROUNDING_SHARE = 1e-13
 # A corner has so many coordinates.
 SPACE = 3
 
@@ -87,7 +86,7 @@ class SharedInverse(NamedTuple):
             by_corner: whether single corners were eliminated in them; else the views.
         """
         roots, s = inverse_roots(normal.C), len(normal.A)
-        covariance = _inverse(eliminated(normal, roots))
+        covariance = positive_inverse(eliminated(normal, roots))
         if not by_corner:
             return cls(covariance, np.zeros((0, SPACE, SPACE)), np.zeros((s, 0)))
         crossed = normal.B.transpose(1, 0, 2).reshape(s, -1)
@@ -312,12 +311,3 @@ class Linearised:
 def _orthonormal(columns: Float[ndarray, "m n 6"]) -> Float[ndarray, "m n 6"]:
     """Bases of the spaces that each view's columns span."""
     return np.linalg.qr(columns / np.maximum(np.sqrt((columns**2).sum(1, keepdims=True)), 1e-300))[0]
-
-
-def _inverse(matrix: Float[ndarray, "s s"]) -> Float[ndarray, "s s"]:
-    """Of a symmetric positive system, whatever its units."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix * scale * scale[:, None]
-    scaled[np.diag_indices_from(scaled)] += ROUNDING_SHARE
-    inverse = np.linalg.inv(scaled)
-    return 0.5 * (inverse + inverse.T) * scale * scale[:, None]

@@ -5,6 +5,8 @@ A homography to the camera's rays starts it, least squares in pixels ends it; no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from orthoscope.fitting.calibration import points_of
@@ -33,7 +35,7 @@ def resect(
     *,
     shape: TargetShape | None = None,
     loss: Loss | None = None,
-    near: Poses | None = None,
+    near: Sequence[Pose] | None = None,
 ) -> tuple[Pose, ...]:
     """camera_from_target of each view, by least squares over its corners, the camera being fixed.
 
@@ -51,7 +53,7 @@ def resect(
         poses = poses_of_camera(camera, observations, detections.target.points)
         known = np.isfinite(poses.translation).all(1)
     else:
-        poses = near.only(observations.order)
+        poses = observations.poses_of(near)
         known = _seen(camera, observations, poses, detections.target.points) >= FEWEST_SEEN
     lost = observations.order[~known]
     if len(lost):

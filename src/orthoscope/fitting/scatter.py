@@ -5,6 +5,8 @@ them by one linear step:
 
 model      independent errors of corners, and the priors' own scatter: noise H^-1
 prior      the second of these alone: noise H^-1 L H^-1
+repeated   the first of these alone, `model` without the priors' part: noise H^-1 A'A H^-1, the scatter over
+           photographs that are taken again, which is what can be sampled
 alike      `model`, with errors that are alike within a view: smooth patterns of order 2, 3 and 4 over the
            board count tau_o times, as often as they are larger in the residuals than independent errors make
            them
@@ -77,6 +79,11 @@ class Scatter:
         """The jackknife's covariance, views that the others cannot tell left out."""
         known = self.left_out[np.isfinite(self.left_out).all(1)]
         return known.T @ known
+
+    @property
+    def repeated(self) -> Float[ndarray, "d d"]:
+        """What independent errors of corners make alone."""
+        return self.model - (self.prior - self.stretch)
 
     @property
     def parameters(self) -> Float[ndarray, "k k"]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 from orthoscope.evaluation.evaluate import Evaluation
-from orthoscope.geometry.numbers import ABSENT, pixels
+from orthoscope.geometry.numbers import ABSENT, percent, pixels
 from orthoscope.report import tables
 from orthoscope.report.data.views import suspects_of
+from orthoscope.report.drawn_corners import drawn_corners
 from orthoscope.report.headline import headline, next_steps
 from orthoscope.report.html import Html, table, tag, unbroken
 from orthoscope.report.panels import PANELS
@@ -83,7 +84,11 @@ def _trust(trusted: Any, pictures: Pictures) -> Html:
     title = "Where it may be trusted"
     if isinstance(trusted, str):
         return _empty("trust", title, trusted)
-    caption = "Colour: predicted error in pixels. Within the line the camera may be used."
+    share = "" if trusted["share"] is None else f", {percent(trusted['share'])} of the frame,"
+    where = f"Within the line{share} the camera may be used."
+    if trusted["share"] == 0.0:
+        where = f"It is more than {trusted['limit']:g} px everywhere."
+    caption = f"Colour: predicted error in pixels. {where}"
     return figure("trust", title, caption, TRUST)
 
 
@@ -177,10 +182,14 @@ def what_to_know(evaluation: Evaluation) -> Html | None:
 
 def photographs_section(evaluation: Evaluation, pictures: Pictures) -> Html:
     """Each photograph with its errors; opened, with corners and residuals; a switch takes it out."""
-    shots = []
+    shots, detections = [], evaluation.calibration.detections
     for row in tables.view_rows(evaluation):
         uri = pictures.small.get(row.image)
-        picture = tag("img", src=uri, alt="", loading="lazy") if uri else tag("span", class_="no-picture")
+        picture = (
+            tag("img", src=uri, alt="", loading="lazy")
+            if uri
+            else drawn_corners(detections.views[row.number - 1], detections.image_size)
+        )
         shots.append(
             tag(
                 "li",
@@ -210,9 +219,19 @@ def photographs_section(evaluation: Evaluation, pictures: Pictures) -> Html:
             "Open one to see its corners where they were found and where the camera predicts them.",
             class_="note",
         ),
+        _not_shown(len(shots) - len(pictures.small)),
         tag("ol", shots, class_="shots"),
         class_="panel",
     )
+
+
+def _not_shown(views: int) -> Html | None:
+    """What stands for photographs that are not shown, and how to have them shown."""
+    if views <= 0:
+        return None
+    words = "Corners alone stand for a frame of a film, and for a photograph that was not at hand:"
+    command = tag("code", "orthoscope report calibration.json --photos PHOTOS")
+    return tag("p", f"{words} ", command, " shows it.", class_="note")
 
 
 def _opener(row: tables.ViewRow, picture: Html) -> Html:

@@ -13,6 +13,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.bent_boards import bowed, drawn, photographed_with, stretched
+from helpers.quick import first_quick
 from helpers.scenes import (
     BOARD,
     NARROW,
@@ -67,7 +68,7 @@ def settled(displacements: np.ndarray) -> np.ndarray:
 
 
 @for_every_camera
-@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES.keys())
+@pytest.mark.parametrize("shape", first_quick(SHAPES))
 def test_without_noise_camera_and_target_are_exact(camera: Camera, shape: np.ndarray):
     detections = photographed_with(shape, camera, 10)
     found = decoupled(detections, shape="free", first_lens="formula")
@@ -184,6 +185,7 @@ def test_the_same_photographs_give_the_same_choice_to_the_last_bit(noisy: Detect
     assert one.candidates == other.candidates
 
 
+@pytest.mark.slow
 def test_a_formula_that_is_asked_for_comes_with_the_free_camera_that_it_was_fitted_to(noisy: Detections):
     fitted = decoupled(noisy, lens="brown", shape="free", first_lens="free")
     assert isinstance(fitted.camera.lens, Brown)
@@ -226,6 +228,7 @@ def test_progress_counts_to_the_end(noisy: Detections):
     assert len(heard) > len(BASES)
 
 
+@pytest.mark.slow
 def test_a_skew_is_found_where_it_is_asked_for():
     camera = Camera(NARROW.image_size, replace(K, skew=5.0), NARROW.lens)
     found = decoupled(photographed_with(BOTH, camera, 10), shape="free", first_lens="free", skew=True)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from helpers.quick import first_quick
 from helpers.scenes import NARROW, K, camera_with, photographed, some_corners
 from orthoscope.evaluation.evaluate import evaluate_on
 from orthoscope.fitting.calibration import residuals_of, rms
@@ -245,7 +246,7 @@ def test_with_distortion_no_member_is_the_camera_even_without_noise():
     assert evaluate_on(nmldc(training, lens="brown:k1").camera, test).nce < 1e-6
 
 
-@pytest.mark.parametrize(("distortion", "known"), [("low", 0.119), ("high", 0.786)])
+@pytest.mark.parametrize(("distortion", "known"), first_quick([("low", 0.119), ("high", 0.786)]))
 def test_the_nce_of_fccm_in_the_papers_simulation_is_as_known(distortion, known):
     """A prototype's figure for k1 k2 about the principal point, from one set of views, lies within the spread
     over sets of views.
@@ -297,6 +298,7 @@ def test_the_settings_make_the_same_camera_again():
     assert again.assumptions == calibration.assumptions
 
 
+@pytest.mark.slow
 def test_held_out_error_works_on_it():
     once = held_out(photographed(NARROW, 8, noise_px=0.1), partial(mldc, correct="nearest"))
     repeated = held_out(photographed(NARROW, 8, noise_px=0.1), mldc)

@@ -259,11 +259,11 @@ def _calibration(
     shape = fit.shape
     return Calibration(
         camera=camera,
-        camera_from_target=resect(camera, used, shape=shape, near=fit.estimate.poses),
+        camera_from_target=resect(camera, used, shape=shape, near=fit.poses),
         detections=used,
         method="decoupled",
         settings=settings,
-        uncertainty=Uncertainty(names, scatter.parameters, scatter.model[:k, :k]),
+        uncertainty=Uncertainty(names, scatter.parameters, scatter.repeated[:k, :k]),
         status=fit.status,
         steps=candidates.flat(model.base).steps + fit.steps,
         version=__version__,

@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.fitting.linearised import ROUNDING_SHARE
 from orthoscope.fitting.observations import Poses
 from orthoscope.fitting.reprojection import POSE
 from orthoscope.geometry.arrays import Float, ndarray
@@ -32,6 +31,7 @@ from orthoscope.models.spline import Displacement
 from orthoscope.models.target_shape import WHOLE
 from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
 from orthoscope.solve.losses import Loss
+from orthoscope.solve.positive import positive_inverse
 
 __all__ = ["DecoupledEstimate", "Joint", "Known", "Precisions"]
 
@@ -154,7 +154,7 @@ class Joint:
     def known(self, sums: NormalEquations) -> Known:
         """What the data determined, from the sums where a solve ended."""
         roots = inverse_roots(sums.C)
-        inverse, covariance = roots @ roots.transpose(0, 2, 1), _inverse(eliminated(sums, roots))
+        inverse, covariance = roots @ roots.transpose(0, 2, 1), positive_inverse(eliminated(sums, roots))
         k, g, n = len(self.free), len(self.energy), self._n
         spread = np.diag(covariance)
         in_spline = (
@@ -244,11 +244,3 @@ def _bordered(zz: ndarray, z: ndarray, zb: ndarray, bb: ndarray, b: ndarray) -> 
     each = np.arange(blocks)
     A[n:, n:].reshape(blocks, q, blocks, q)[each, :, each] = bb
     return A, np.concatenate([z, b.ravel()])
-
-
-def _inverse(matrix: Float[ndarray, "n n"]) -> Float[ndarray, "n n"]:
-    """Of a symmetric positive system, whatever its units."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix * scale * scale[:, None]
-    scaled[np.diag_indices_from(scaled)] += ROUNDING_SHARE
-    return np.linalg.inv(scaled) * scale * scale[:, None]

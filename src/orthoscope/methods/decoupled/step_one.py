@@ -15,6 +15,7 @@ import numpy as np
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.pose import Pose
 from orthoscope.methods.decoupled.evidence import Evidence, first_guess
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint
@@ -73,6 +74,11 @@ class StepOneFit:
     def views(self) -> int:
         """How many it was made from."""
         return len(self.problem.measurements.observations.order)
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """camera_from_target of each view."""
+        return self.problem.measurements.observations.poses_in_order(self.estimate.poses)
 
     @property
     def start(self) -> Start:
