@@ -51,8 +51,10 @@ MOST_ROUGH, SMOOTH_RADII = 3.0, 0.03
 # A disc's radius is at most this share off what those near it foresee, or so many times the usual share.
 MOST_OFF_SIZE, TIMES_OFF_SIZE = 0.1, 5.0
 # A disc's centre is at most so many of its radii off from where those near it foresee it, or so many times as
-# far as is usual, but then not more than so many pixels.
+# far as is usual; one that is rough or of another size then not more than so many pixels.
 MOST_OFF_PLACE, TIMES_OFF_PLACE, MOST_OFF_PX = 0.15, 6.0, 0.8
+# A disc whose outline is rougher than this, radii, or its radius off by more than this share, may be covered.
+SURELY_SMOOTH, SURELY_AS_LARGE = 0.015, 0.03
 
 
 def numbered(discs: Ellipses) -> tuple[Int[ndarray, " n"], Int[ndarray, "n 2"]]:
@@ -239,7 +241,9 @@ def like_the_others(
             told, reach = weights @ known[nearest], max(1.0, float(np.linalg.norm(weights)))
             off_place[number] = np.hypot(*(told - known[number])[:2]) / radii[number] / reach
             off_size[number] = abs(told[2] - known[number, 2]) / reach
-    usual = np.minimum(TIMES_OFF_PLACE * median(off_place), MOST_OFF_PX / radii)
+    usual = np.full(len(ids), TIMES_OFF_PLACE * median(off_place))
+    suspect = (roughness > SURELY_SMOOTH) | (off_size > SURELY_AS_LARGE)
+    usual[suspect] = np.minimum(usual, MOST_OFF_PX / radii)[suspect]
     good &= off_place < np.maximum(MOST_OFF_PLACE, usual)
     return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
 
