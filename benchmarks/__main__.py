@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import time
@@ -28,11 +29,16 @@ def main(names: list[str]) -> int:
     with Peers() as peers, tempfile.TemporaryDirectory(prefix="benchmarks-") as folder:
         for name in names or PARTS:
             print(f"{name} ...", end=" ", file=sys.stderr, flush=True)
-            start = time.perf_counter()
+            start, load = time.perf_counter(), os.getloadavg()[0]
             part = PARTS[name](peers, Path(folder))
             seconds = time.perf_counter() - start
             results = read_results(RESULTS).with_part(
-                name, part, machine=machine(), peers=peers, seconds=seconds
+                name,
+                part,
+                machine=machine(),
+                peers=peers,
+                seconds=seconds,
+                load=max(load, os.getloadavg()[0]),
             )
             write_results(RESULTS, results)
             PAGE.write_text(page(results), encoding="utf-8")

@@ -17,13 +17,15 @@ HEAD = """# orthoscope beside its peers
 Made by `make bench`; do not edit. A ratio is this project's figure over the peer's, from the same run on the same machine: below 1 we
 are better. Times are the best of several turns.
 """
+# More programs than this, with our own, are not ours alone.
+QUIET_LOAD = 4.0
 WORDS = {True: "yes", False: "**no**", None: ""}
 
 
 @dataclass(frozen=True)
 class Measured:
     """A part, and where it was measured: machine, versions of the peers that were asked, reasons why others
-    could not be, duration.
+    could not be, duration, how many programs ran at once (the load average, at its largest).
     """
 
     part: Part
@@ -31,6 +33,7 @@ class Measured:
     versions: dict[str, str]
     missing: dict[str, str]
     seconds: float
+    load: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -39,9 +42,11 @@ class Results:
 
     parts: dict[str, Measured] = field(default_factory=dict)
 
-    def with_part(self, name: str, part: Part, *, machine: str, peers: Peers, seconds: float) -> Results:
+    def with_part(
+        self, name: str, part: Part, *, machine: str, peers: Peers, seconds: float, load: float = 0.0
+    ) -> Results:
         """The same with this part's new figures."""
-        measured = Measured(part, machine, dict(peers.versions), dict(peers.missing), seconds)
+        measured = Measured(part, machine, dict(peers.versions), dict(peers.missing), seconds, load)
         return Results({**self.parts, name: measured})
 
 
@@ -79,7 +84,16 @@ def _where(results: Results) -> list[str]:
     versions = dict.fromkeys(version for one in results.parts.values() for version in one.versions.values())
     missing = {name: why for one in results.parts.values() for name, why in one.missing.items()}
     lines = [f"Machine: {'; '.join(machines)}.", f"Versions: {', '.join(versions)}."]
-    return lines + [f"Missing: {name} ({why}); see README.md." for name, why in missing.items()]
+    lines += [f"Missing: {name} ({why}); see README.md." for name, why in missing.items()]
+    shared = [one.load for one in results.parts.values() if one.load > QUIET_LOAD]
+    if shared:
+        lines.append(
+            f"**The machine was shared**: up to {max(shared):.0f} programs wanted a core at once while it was"
+            " measured. Ratios of CPU time stand, since contenders take turns; what is said by the clock does"
+            " not."
+        )
+    lines.append(f"Measured in {sum(one.seconds for one in results.parts.values()) / 60.0:.0f} minutes.")
+    return lines
 
 
 def _budgets(results: Results) -> list[str]:

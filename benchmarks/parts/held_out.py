@@ -38,7 +38,7 @@ WIDE_PEERS = [
     ("mrcal", "splined"),
 ]
 CHOSEN = "chosen by itself"
-PATIENCE = 25.0  # seconds: a peer that has taken so long over the sets so far is not asked about the others
+PATIENCE = 12.0  # seconds: a peer that has taken so long over the sets so far is not asked about the others
 OURS, WIDE_OURS = (CHOSEN, "free target", "brown"), (CHOSEN, "kannala_brandt")
 JUDGED = ("opencv-left", "udacity", "sony", "bumblebee-left", "bumblebee-right", "calibrel")
 ABOUT = (

@@ -126,15 +126,13 @@ def _from_corners(part: Part, folder: Path, count: int) -> None:
     theirs = [MRCAL, "--corners-cache", table, "--lensmodel", "LENSMODEL_OPENCV5", "--focal", "750"]
     theirs += ["--object-spacing", "0.015625", "--object-width-n", "14", "--object-height-n", "20"]
     theirs += ["--imagersize", str(width), str(height), "--outdir", out[1], "view*"]
-    for words, extra, budgets in (
-        ("calibrate", [], DEFAULT),
-        ("calibrate --method fccm --no-report", ["--method", "fccm", "--no-report"], PLAIN),
-    ):
-        commands = {"ours": [*ours, *extra], "theirs": theirs}
-        found = _row(
-            part, f"{words}, {count} views", commands, (MRCAL, budgets[count]), rounds=2 if count < 500 else 1
-        )
-        if found and not extra:
+    plain = "calibrate --method fccm --no-report"
+    commands = {"calibrate": ours, plain: [*ours, *plain.split()[1:]], MRCAL: theirs}
+    results = _raced(commands, rounds=2 if count < 500 else 1)
+    for words, budgets in (("calibrate", DEFAULT), (plain, PLAIN)):
+        quantity, against = f"{words}, {count} views", (MRCAL, budgets[count])
+        found = _told(part, quantity, results[words], results[MRCAL], against)
+        if found and words != plain:
             budget = MEMORY_MB if count == 1000 else None
             memory = found.answer["memory"]
             part.rows.append(Row(f"the same, memory, {count} views", memory, unit="MB", at_most=budget))
@@ -199,12 +197,29 @@ def _row(
     at_most: float | None = None,
 ) -> Result | None:
     """Adds a row of CPU time; returns our result where there is one."""
+    results = _raced(commands, rounds=rounds)
+    return _told(part, quantity, results["ours"], results.get("theirs"), against, at_most=at_most)
+
+
+def _raced(commands: dict[str, list[Any]], *, rounds: int) -> dict[str, Result]:
+    """Whole processes that take turns, BLAS with one thread."""
     env = os.environ | ONE_THREAD
-    results = race(
+    return race(
         {who: lambda command=command: whole_process(command, env=env) for who, command in commands.items()},
         rounds=rounds,
     )
-    ours, theirs = results["ours"], results.get("theirs")
+
+
+def _told(
+    part: Part,
+    quantity: str,
+    ours: Result,
+    theirs: Result | None,
+    against: tuple[str, float] | None,
+    *,
+    at_most: float | None = None,
+) -> Result | None:
+    """Adds a row of what has been raced; returns our result where there is one."""
     for each in (ours, theirs):
         if each and each.failed:
             part.remarks.append(f"{quantity}: {each.failed}.")
