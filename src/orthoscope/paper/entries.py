@@ -3,9 +3,9 @@
 As printed: FCCM has k1 and k2 about the principal point, although the simulated lens has tangential terms and
 a centre of its own; NMLDC measures straightness in the straightened image, with the fourth order of the
 polynomial (of the fifth it makes nothing at 1 px of noise); MLDC searches eq. (7) from the closed form, with
-identity damping. A search takes seconds, so only the first trials have it. Ours are the same methods as they
-can be made to work, FCCM with a lens that can follow this one, every other method of METHODS and, in a table,
-every method with every lens.
+identity damping. A search takes many times what the others take, so only the first trials have it. Ours are
+the same methods as they can be made to work, FCCM with a lens that can follow this one, every other method of
+METHODS and, in a table, every method with every lens.
 """
 
 from __future__ import annotations
