@@ -27,7 +27,7 @@ from orthoscope.models.lenses import Brown, Division, KannalaBrandt, lens_name
 __all__ = ["STREET_LENSES", "apart", "street_edges"]
 
 PHOTOGRAPHS = 3
-# By what they are: the lens, and the focal length in pixels.
+# By what they are and the angle across the diagonal: the lens, and the focal length in pixels.
 STREET_LENSES: dict[str, tuple[Lens, float]] = {
     "no distortion": (Brown(), 520.0),
     "mild barrel": (Brown(k1=-0.08, k2=0.01), 520.0),
@@ -36,8 +36,8 @@ STREET_LENSES: dict[str, tuple[Lens, float]] = {
     "strong pincushion": (Brown(k1=0.2, k2=0.05), 520.0),
     "division": (Division(l=-0.35), 520.0),
     "division, 110 degrees": (Division(l=-0.3), 400.0),
-    "Kannala-Brandt, 95 degrees": (KannalaBrandt(k1=-0.03, k2=0.005), 400.0),
-    "Kannala-Brandt, 155 degrees": (KannalaBrandt(k1=-0.02, k2=0.003), 300.0),
+    "Kannala-Brandt, 118 degrees": (KannalaBrandt(k1=-0.03, k2=0.005), 400.0),
+    "Kannala-Brandt, 157 degrees": (KannalaBrandt(k1=-0.02, k2=0.003), 300.0),
 }
 
 
