@@ -218,6 +218,14 @@ def test_what_a_shutter_did_is_in_the_error_and_the_camera_is_one():
     assert "one camera" not in verdict.limit
 
 
+@pytest.mark.parametrize(
+    ("share", "covered", "cause"),
+    [(0.4, 0.4, "region"), (0.2, 0.6, "open"), (0.5, 0.9, "open"), (0.8, 0.9, "")],
+)
+def test_corners_are_missing_where_the_camera_holds_over_what_lies_between_them(share, covered, cause):
+    assert verdict_on(Situation(share=share, covered=covered, error_px=0.4)).cause == cause
+
+
 @pytest.mark.parametrize("fault", ["shutter that matters little", "hardly differing"])
 def test_photographs_that_differ_by_what_does_not_matter_are_not_blamed(fault):
     verdict = verdict_on(Situation(**FAULTS[fault]))
