@@ -1,6 +1,6 @@
 """Rules of choice beside each other, where the true camera is known: boards, poses and noise like real ones.
 
-    ORTHOSCOPE_DATASETS=photographs python -m benchmarks.studies.choice 60
+    ORTHOSCOPE_DATASETS=photographs python -m benchmarks.studies.choice 60 [alike]
 
 Worlds are fits of real sets, taken as truth: poses, which corners were seen, the camera (its free lens or its
 formula) and the board's shape.
@@ -186,8 +186,12 @@ def in_words(ratios: list[float]) -> str:
     return f"{mean:.2f} ± {error:.2f}, nine of ten below {np.percentile(ratios, 90):.1f}"
 
 
-def main(folder: Path, sets: int) -> None:
-    """Print a line for each set of photographs, and what each rule gives."""
+def main(folder: Path, sets: int, only: str = "") -> None:
+    """Print a line for each set of photographs, and what each rule gives.
+
+    Args:
+        only: a case; the others are left out.
+    """
     ratios: dict[str, list[float]] = {name: [] for name in (*RULES, MADE_BY)}
     by_entry: dict[tuple[str, ...], list[float]] = {}
     honest: list[tuple[str, int, float]] = []
@@ -195,7 +199,8 @@ def main(folder: Path, sets: int) -> None:
         rng = np.random.default_rng(seed)
         name = list(WORLDS)[rng.integers(len(WORLDS))]
         case, photographs, truth, world = drawn(classic_corners(folder, name), WORLDS[name], rng)
-        entries = tried(photographs, truth, world) if len(photographs.views) >= 4 else []
+        wanted = len(photographs.views) >= 4 and only in ("", case)
+        entries = tried(photographs, truth, world) if wanted else []
         if not entries:
             continue
         corners = np.array([len(view.ids) for view in photographs.views], dtype=float)
@@ -234,4 +239,5 @@ def main(folder: Path, sets: int) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(os.environ["ORTHOSCOPE_DATASETS"]), int(sys.argv[1]) if len(sys.argv) > 1 else 30)
+    asked = sys.argv[1:]
+    main(Path(os.environ["ORTHOSCOPE_DATASETS"]), int(asked[0]) if asked else 30, *asked[1:])

@@ -1,6 +1,6 @@
 """How often photographs with which nothing is wrong are blamed, test by test.
 
-    python -m benchmarks.studies.false_alarms --seeds 10
+    python -m benchmarks.studies.false_alarms --seeds 2 [--views 5 8]
 
 Perfect photographs (worlds.py: a camera that is not this project's, a true board, white noise), 5 to 30 of
 them, two boards, three lenses, by the default method and by `fccm` with the lens's own formula.  Every test
@@ -57,21 +57,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seeds", type=int, default=10)
-    seeds = parser.parse_args(arguments).seeds
+    parser.add_argument("--seeds", type=int, default=2, help="of each board and lens: six sets")
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--views", type=int, nargs="*", default=VIEWS)
+    asked = parser.parse_args(arguments)
     print(f"| method | views | sets | {' | '.join(FAULTS)} | any |\n|{'---|' * (4 + len(FAULTS))}")
     any_of_all, sets = 0, 0
-    for method, count in product(METHODS, VIEWS):
+    for method, count in product(METHODS, asked.views):
         found: Counter[str] = Counter()
-        for (lens, camera), board, seed in product(LENSES.items(), BOARDS, range(seeds)):
+        for (lens, camera), board, seed in product(LENSES.items(), BOARDS, range(asked.seeds)):
             standing = replace(USUAL.standing, count=count, fill=(0.3, 0.6))
             recipe = replace(USUAL, camera=camera, board=board, standing=standing)
             formula = "kannala_brandt" if camera.fisheye else lens
             settings = {"method": method} | ({"lens": formula} if method == "fccm" else {})
-            faults = blamed(recipe, 1000 + seed, **settings)
+            faults = blamed(recipe, 1000 + asked.first + seed, **settings)
             found.update(faults)
             found["any"] += bool(faults)
-        of = len(LENSES) * len(BOARDS) * seeds
+        of = len(LENSES) * len(BOARDS) * asked.seeds
         shares = " | ".join(f"{100 * found[fault] / of:.1f} %" for fault in (*FAULTS, "any"))
         print(f"| {method} | {count} | {of} | {shares} |", flush=True)
         any_of_all, sets = any_of_all + found["any"], sets + of

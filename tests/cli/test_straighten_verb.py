@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 import pytest
+from benchmarks.studies.streets import street_camera, street_photograph
 
-from helpers.streets import street_camera, street_photograph
 from orthoscope.files.images import write_image
 from orthoscope.formats.load import load_camera
 from orthoscope.models.lenses import Brown

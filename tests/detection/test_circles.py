@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from orthoscope.detection.circles import see_circles
+from orthoscope.detection.detect import detect
 from orthoscope.detection.disc_outlines import refined_discs
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.fitting.disc_centres import disc_offsets
@@ -76,3 +77,27 @@ def test_an_outline_that_is_not_whole_is_no_disc():
     rough = Ellipses(truth[19:21], np.tile(np.eye(2) * 8.0, (2, 1, 1)))
     assert np.isfinite(refined_discs(picture, rough).ellipses.centres).all()
     assert np.isfinite(refined_discs(covered, rough).ellipses.centres[:, 0]).tolist() == [True, False]
+
+
+def test_discs_that_are_not_as_wide_as_described_are_told_of():
+    printed, said = Circles(4, 7, 0.02, "asymmetric", 0.012), Circles(4, 7, 0.02, "asymmetric", 0.008)
+    picture, _ = photographed(printed, (0.3, 0.2, 0.1), 0.3)
+    (remark,) = detect(picture, target_of(said)).remarks
+    assert remark.image == said.description
+    assert remark.words.startswith("its discs are seen 12.")
+    assert (
+        "expected 8.0 mm as described. If that is so, say --target circles:4x7:20mm:asymmetric:12"
+        in remark.words
+    )
+    assert not detect(picture, target_of(printed)).remarks
+
+
+def test_a_disc_that_is_partly_covered_is_left_out():
+    board = Circles(4, 7, 0.02, "asymmetric", 0.012)
+    picture, truth = photographed(board, (0.1, 0.2, 0.1), 0.3)
+    x, y = np.rint(truth[12]).astype(int)
+    picture[y : y + 40, x - 40 : x + 40] = 190  # the lower half, by something as bright as the paper
+    sight = see_circles(picture, board)
+    assert isinstance(sight, Sight)
+    assert 12 not in sight.ids
+    assert np.linalg.norm(sight.pixels - truth[sight.ids], axis=1).max() < 0.3

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from helpers.bent_boards import bowed, photographed_with
 from helpers.scenes import NARROW, WIDE, photographed
 from orthoscope.evaluation.camera_error import CameraError, predicted_error, rms_difference, seen_places
-from orthoscope.evaluation.region import between
+from orthoscope.evaluation.region import MARGIN_SHARE, between
 from orthoscope.evaluation.verdict.situation import FINE_PX
 from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.fitting.leave_one_out import leave_one_out
@@ -182,10 +182,11 @@ def test_places_are_trusted_where_the_error_is_small_and_corners_are_around(
     assert trusted.any()
     assert predicted.limit_px == FINE_PX  # what is trusted is what a grade calls good
     assert (predicted.far.ravel()[trusted] < 1.03 * FINE_PX).all()  # the way to its border goes in steps
-    assert (cells[trusted] >= pixels.min(0)).all()
-    assert (cells[trusted] <= pixels.max(0)).all()
+    margin = MARGIN_SHARE * 640
+    assert (cells[trusted] >= pixels.min(0) - margin).all()
+    assert (cells[trusted] <= pixels.max(0) + margin).all()
     assert not predicted.trusted(np.array([[-50.0, 20.0], [700.0, 240.0]])).any()
-    good = (predicted.far.ravel() < FINE_PX) & between(pixels, cells)
+    good = (predicted.far.ravel() < FINE_PX) & between(pixels, cells, margin)
     assert trusted.sum() > 0.95 * good.sum()  # the region is star-shaped, and so is what is good here
 
 

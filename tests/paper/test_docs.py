@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import inspect
 import re
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from orthoscope.paper import sentences
 from orthoscope.paper.entries import FCCM, FCCM5, OURS, PAPER, REPEATED, fair_peers
 from orthoscope.paper.section4 import PARTS
+from orthoscope.paper.sentences import Sentence
 from orthoscope.paper.trials import Condition, simulated_trial, trial_judged
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+NUMERALS = {16: "sixteen"}
 NUMBER = r"([\d.]+)"
 ROWS = {
     name: tuple(map(float, numbers))
@@ -28,6 +33,34 @@ def test_every_file_that_it_names_is_there():
     named = {name for name in re.findall(r"`((?:\w+/)+\w*(?:\.py)?)`", TEXT) if name.split("/")[0] in folders}
     assert len(named) > 25
     assert [name for name in sorted(named) if not (ROOT / "src" / "orthoscope" / name).exists()] == []
+
+
+JUDGED = re.findall(
+    r"^\| ([\d.]+) \| ([^|]+?) \| `(paper/\w+)\.py` \(`(\w+)`\) \| ([^|]+?) \|$", TEXT, re.MULTILINE
+)
+
+
+def test_every_function_that_it_names_is_in_its_file():
+    named = re.findall(r"`((?:\w+/)+\w+)\.py` \(`([\w]+)`\)", TEXT)
+    assert len(named) > 20
+    for path, name in named:
+        module = import_module("orthoscope." + path.replace("/", "."))
+        assert hasattr(module, name) or name in inspect.getsource(module), (path, name)
+
+
+def test_each_sentence_of_the_paper_that_is_judged_is_in_the_index_once_with_who_judges_it():
+    every = {name: one for name, one in vars(sentences).items() if isinstance(one, Sentence)}
+    indexed = []
+    for section, begins, path, function, shown in JUDGED:
+        source = inspect.getsource(getattr(import_module("orthoscope." + path.replace("/", ".")), function))
+        [said] = re.findall(r"sentences\.(\w+)", source)[:1]
+        assert every[said].section == section
+        if begins != "the same, its first half":
+            assert every[said].text.startswith(begins)
+            indexed.append(said)
+        assert set(shown.split(", ")) <= set(PARTS)
+    assert sorted(indexed) == sorted(every)
+    assert f"{NUMERALS[len(every)]} of them" in TEXT
 
 
 def test_every_part_that_it_names_can_be_run():

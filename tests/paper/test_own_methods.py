@@ -52,7 +52,9 @@ def test_a_function_and_a_method_with_settings_are_named_by_with():
     assert own_entry("huber=fccm:loss=huber").settings == {"loss": "huber"}
 
 
-@pytest.mark.parametrize("text", ["nowhere.at_all:f", "json:no_such", "json", "json:__name__", "fccm:nolens"])
+@pytest.mark.parametrize(
+    "text", ["nowhere.at_all:f", "json:no_such", "json", "json:__name__", "fccm:nolens", "=fccm:brown", ""]
+)
 def test_what_is_no_method_is_refused(text):
     with pytest.raises(InputError):
         own_entry(text)

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from orthoscope.cli.paper import paper as paper_command
 from orthoscope.files.images import write_image
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.models.camera import Camera, Intrinsics
@@ -219,3 +221,19 @@ def test_photographs_that_are_not_there_are_a_wrong_command(tmp_path):
     assert told.returncode == 2
     assert "none" in told.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        (("--tilt", "50", "10"), "50 is more than 10"),
+        (("--fill", "0.9", "0.5"), "0.9 is more than 0.5"),
+        (("--fill", "0.5", "1"), "0.98"),
+        (("--noise", "0.1,,0.2"), "such as 0,0.1,1"),
+        (("--points", "3x"), "such as 3x4,14x20"),
+    ],
+)
+def test_a_range_or_a_list_that_is_none_is_refused_in_the_units_it_was_given_in(told, expected):
+    refused = CliRunner().invoke(paper_command, [*told, "--only", "fig4"])
+    assert refused.exit_code == 2
+    assert expected in refused.output

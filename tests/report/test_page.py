@@ -302,6 +302,12 @@ def test_a_target_whose_shape_was_estimated_has_its_table_and_its_figure_and_a_f
     assert shape_rows(replace(shaped.calibration, target_shape=TargetShape.flat(54))) == []
 
 
+def test_the_line_on_the_map_is_said_to_hold_what_the_region_holds(pages, ordinary):
+    assert f"Within the line, {100 * ordinary.error.share:.0f} % of the frame" in " ".join(
+        Page(pages["ordinary"]).words
+    )
+
+
 def test_what_was_tried_is_told_with_what_it_loses(pages, shaped):
     flat, free = candidate_rows(shaped.calibration)
     assert (flat.target, flat.held_out, flat.standard_error, flat.loses) == (

@@ -15,14 +15,17 @@ __all__ = ["calibrate", "calibrate_into"]
 EXAMPLE = """\b
 Example:
   $ orthoscope calibrate photos/ --target chessboard:9x6:25mm -o camera/
-  verdict    Good: off by about 0.2 px where corners were seen, and by less than 0.5 px over 71 % of the frame.
+  verdict    Good within a region: off by about 0.2 px where corners were seen, and by less than 0.5 px over
+             67 % of the frame. Too few corners were seen at the top left. Next, photograph the target at the
+             top left.
   camera     fx 534.83 ± 0.78  fy 535.07 ± 0.85  cx 342.10 ± 0.99  cy 239.69 ± 0.88  lens free
   photos     14 used, 756 corners; corners missed by 0.084 px where a photograph was not used
   wrote      camera/detections.json, camera/calibration.json, camera/evaluation.json, camera/report.html
 
 \b
 PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
-Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong.
+Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong,
+3 with --strict: the camera must not be used.
 """
 
 

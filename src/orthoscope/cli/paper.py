@@ -58,6 +58,15 @@ class _Grids(click.ParamType):
 NUMBERS, GRIDS = _Numbers(), _Grids()
 
 
+def _in_order(
+    context: click.Context, parameter: click.Parameter, value: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """A range as it was given, if its least comes first."""
+    if value is not None and value[0] > value[1]:
+        raise click.BadParameter(f"{value[0]:g} is more than {value[1]:g}; expected the least first.")
+    return value
+
+
 @click.command(epilog=EXAMPLE)
 @click.option(
     "--photos",
@@ -89,12 +98,14 @@ NUMBERS, GRIDS = _Numbers(), _Grids()
     "--tilt",
     nargs=2,
     type=click.FloatRange(0, 70),
+    callback=_in_order,
     help="Least and greatest tilt of the simulated sheet, degrees; 0 45 by default.",
 )
 @click.option(
     "--fill",
     nargs=2,
-    type=click.FloatRange(0, 1, min_open=True),
+    type=click.FloatRange(0, 0.98, min_open=True),
+    callback=_in_order,
     help="Share of the simulated image that the sheet fills, from .. to; 0.8 0.98 by default.",
 )
 @click.option(

@@ -33,7 +33,7 @@ Exit: 0 done, 1 too few edges agree on a lens, 2 the command is wrong.
     default="auto",
     show_default=True,
     metavar="NAME",
-    help="A formula, or with the coefficients to find, brown:k1,k2; auto takes division or brown:k1,k2.",
+    help="A formula, or with the coefficients to find, brown:k1,k2; auto takes brown's, kannala_brandt's or division.",
 )
 @options.straight_folder
 @options.keep

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from orthoscope.detection.copies import resized, to_photograph
-from orthoscope.detection.disc_lattice import foreseen, laid_on, like_the_others, numbered
+from orthoscope.detection.disc_lattice import diameter_in_steps, foreseen, laid_on, like_the_others, numbered
 from orthoscope.detection.disc_outlines import refined_discs, spots
 from orthoscope.detection.sight import Sight, Unseen
-from orthoscope.geometry.arrays import Float, Int, ndarray
+from orthoscope.geometry.arrays import Int, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.circles import Circles
 
@@ -40,7 +40,7 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
         board: what to look for.
     """
     count = board.columns * board.rows
-    best: tuple[Int[ndarray, " n"], ndarray] = np.zeros(0, dtype=int), np.zeros((0, 2))
+    best = Sight(np.zeros(0, dtype=int), np.zeros((0, 2)))
     several, seen, shapes = False, 0, set()
     for side in COPY_SIDES:
         copy = resized(grey, side)
@@ -51,19 +51,19 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
             for found in spots(picture):
                 which, places = numbered(found)
                 seen = max(seen, len(which))
-                if len(which) < max(FEWEST_DISCS, LEAST_DISCS_SHARE * count, len(best[0])):
+                if len(which) < max(FEWEST_DISCS, LEAST_DISCS_SHARE * count, len(best.ids)):
                     continue
                 discs = Ellipses(found.centres[which], found.axes[which])
                 ids, unsure = laid_on(board, discs, places, copy.shape)
                 several |= unsure
                 if (ids >= 0).sum() >= FEWEST_DISCS:
                     best = max(
-                        best, _outlined(copy, whole, board, discs, ids), key=lambda sight: len(sight[0])
+                        best, _outlined(copy, whole, board, discs, ids), key=lambda sight: len(sight.ids)
                     )
-                if len(best[0]) >= ENOUGH_DISCS_SHARE * count:
-                    return Sight(*best)
-    if len(best[0]) >= FEWEST_DISCS:
-        return Sight(*best)
+                if len(best.ids) >= ENOUGH_DISCS_SHARE * count:
+                    return best
+    if len(best.ids) >= FEWEST_DISCS:
+        return best
     if several:
         return Unseen("is in it in part only, and which part cannot be told")
     return Unseen(f"was not found in it: {seen} discs hang together, the board has {count}")
@@ -71,7 +71,7 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
 
 def _outlined(
     copy: ndarray, grey: ndarray, board: Circles, discs: Ellipses, ids: Int[ndarray, " n"]
-) -> tuple[Int[ndarray, " m"], Float[ndarray, "m 2"]]:
+) -> Sight:
     """Ids and centres from outlines in the photograph, those of discs that were no spots included."""
     scale = grey.shape[1] / copy.shape[1]
     mine = ids >= 0
@@ -98,4 +98,5 @@ def _outlined(
             np.concatenate([fine.centres, added.centres[near]]), np.concatenate([fine.axes, added.axes[near]])
         )
     order = np.argsort(known)
-    return known[order], fine.centres[order]
+    diameter = diameter_in_steps(fine, board.neighbour_places()[known]) * board.nearest
+    return Sight(known[order], fine.centres[order], diameter=diameter)

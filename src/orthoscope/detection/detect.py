@@ -26,6 +26,7 @@ from orthoscope.files.pictures import Given, Picture, pictures
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.cores import at_once
 from orthoscope.targets.chessboard import Chessboard
+from orthoscope.targets.circles import Circles
 from orthoscope.targets.detections import Detections, Remark, SetAside, View, view_name
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
@@ -38,6 +39,9 @@ LISTED_PHOTOGRAPHS = 5
 TRIED_PHOTOGRAPHS = 5
 # Lattices of one size in so many of them are a board's.
 ALIKE_PHOTOGRAPHS = 3
+
+# Discs that are larger or smaller than described by more than this share of it are told of.
+MOST_DIAMETER_OFF = 0.15
 
 
 class _Look(NamedTuple):
@@ -96,7 +100,11 @@ def detect(
     ]
     if not views or size is None:
         raise CalibrationError(_nothing_found(given, looks, target, aside))
-    remarks += [*_never_seen(looks, target), *_if_another(given, looks, target, views)]
+    remarks += [
+        *_never_seen(looks, target),
+        *_otherwise_drawn(looks, target),
+        *_if_another(given, looks, target, views),
+    ]
     return Detections(target, size, tuple(views), tuple(aside), remarks=tuple(remarks))
 
 
@@ -194,6 +202,24 @@ def _never_seen(looks: list[_Look], target: Target) -> list[Remark]:
         Remark(member.name, f"{told} {member.board.advice if member.board else 'See that it is there'}")
         for member in never
     ]
+
+
+def _otherwise_drawn(looks: list[_Look], target: Target) -> list[Remark]:
+    """A remark on each grid of discs whose discs are larger or smaller than its description says."""
+    remarks = []
+    for number, member in enumerate(target.members or (target,)):
+        seen = [look.found[number].diameter for look in looks if number in look.found]
+        if not isinstance(member.board, Circles) or not any(seen):
+            continue
+        said, drawn = member.board.diameter, float(np.median([one for one in seen if one > 0]))
+        if abs(drawn - said) > MOST_DIAMETER_OFF * said and drawn < member.board.nearest:
+            spec = replace(member.board, diameter=round(drawn, 4)).description
+            sizes = [f"{1e3 * length:.1f} mm" for length in (drawn, member.board.nearest, said)]
+            words = "its discs are seen {} wide where they stand {} apart; expected {} as described.".format(
+                *sizes
+            )
+            remarks.append(Remark(member.name, f"{words} If that is so, say --target {spec}"))
+    return remarks
 
 
 def _board_instead(given: list[Picture], target: Chessboard) -> tuple[int, int] | None:

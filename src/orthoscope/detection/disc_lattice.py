@@ -19,7 +19,7 @@ from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.circles import Circles
 
-__all__ = ["foreseen", "laid_on", "like_the_others", "numbered"]
+__all__ = ["diameter_in_steps", "foreseen", "laid_on", "like_the_others", "numbered"]
 
 # So many discs may be next to one.
 NEIGHBOUR_CANDIDATES = 12
@@ -235,3 +235,29 @@ def _foretelling(steps: Int[ndarray, "k 2"]) -> Float[ndarray, " k"]:
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
     enough = len(x) >= FORESEEING_DISCS and min(len(np.unique(x)), len(np.unique(y))) >= 3
     return np.linalg.pinv(terms[:, : 6 if enough else 3])[0]
+
+
+def _inverses(axes: Float[ndarray, "n 2 2"]) -> Float[ndarray, "n 2 2"]:
+    """NaN for discs without an outline."""
+    whole = np.asarray(np.isfinite(axes).all((1, 2)))
+    return np.where(
+        whole[:, None, None], np.linalg.inv(np.where(whole[:, None, None], axes, np.eye(2))), np.nan
+    )
+
+
+def diameter_in_steps(discs: Ellipses, places: Int[ndarray, "n 2"]) -> float:
+    """A disc's diameter over its distance from the next, as its own ellipse's frame has it; 0 of discs
+    that stand alone.
+
+    Args:
+        discs: NaN for those without an outline.
+        places: in the lattice, as `numbered` says.
+    """
+    inverse, lookup = _inverses(discs.axes), {tuple(place): i for i, place in enumerate(places.tolist())}
+    far = [
+        float(np.hypot(*(inverse[i] @ (discs.centres[other] - discs.centres[i]))))
+        for place, i in lookup.items()
+        for step in ((1, 0), (0, 1))
+        if (other := lookup.get((place[0] + step[0], place[1] + step[1]))) is not None
+    ]
+    return 2.0 / float(np.nanmedian(far)) if np.isfinite(far).any() else 0.0

@@ -96,7 +96,8 @@ def refined(
     first, part = _surroundings(grey, rough, square.max())
     small = _reduced(part, shrink)
     near = (rough - first + 0.5) / shrink - 0.5
-    near = _near(small, near, places) if approach else near
+    step = square / shrink
+    near = _near(small, near, step) if approach else near
     shape = grid_shape(near, places)
     saddles = fit_saddles(
         cv2.GaussianBlur(small, (0, 0), SMOOTHING_SIGMA),
@@ -106,7 +107,7 @@ def refined(
         bends=np.stack([shape.bend_along, shape.bend_down], axis=1),
         arms=_arms(shape, arm),
     )
-    allowed = np.maximum(FARTHEST_SHARE * nearest_neighbour(near, places), 1.0)
+    allowed = np.maximum(FARTHEST_SHARE * step, 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
     noise = NOISE_LEFT_SHARE * noise_variance(small)
     noise_share = noise / np.maximum(signal + noise, 1e-9)
@@ -114,8 +115,10 @@ def refined(
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     sure = believed & (saddles.spread * shrink < WIDEST_SPREAD)
-    sure &= _are_alike(saddles, grid_shape(saddles.places, places), noise_share)
-    sure &= _are_clear(saddles, near, places, arm)
+    sure &= _are_clear(saddles, step, arm)
+    if not (sure & (_turn(saddles, shape) < WIDEST_TURN)).all():  # what is off was perhaps not near yet
+        shape = grid_shape(saddles.places, places)
+    sure &= _are_alike(saddles, shape, noise_share)
     return Refined(pixels, believed, saddles.explained, sure)
 
 
@@ -123,22 +126,26 @@ def _are_alike(saddles: Saddles, shape: GridShape, noise_share: Float[ndarray, "
     """Which saddles have edges along the lattice's lines, about as much contrast as most, and are as true to
     the picture as most: where something covers a part of a window, it is explained less.
     """
-    lines = np.stack([shape.along, shape.down], axis=1)
-    turn = saddles.angles - np.arctan2(lines[..., 1], lines[..., 0])
-    off = np.abs((turn + 0.5 * np.pi) % np.pi - 0.5 * np.pi).max(1)
     contrast = np.abs(saddles.contrast)
     left = 1.0 - saddles.explained - noise_share
     true = left - median(left) < MOST_UNEXPLAINED + MOST_UNEXPLAINED_NOISE * noise_share
-    return true & (off < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * median(contrast))
+    return true & (_turn(saddles, shape) < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * median(contrast))
+
+
+def _turn(saddles: Saddles, shape: GridShape) -> Float[ndarray, " m"]:
+    """How far each saddle's edges are turned from the lattice's lines at most, radians."""
+    lines = np.stack([shape.along, shape.down], axis=1)
+    turn = saddles.angles - np.arctan2(lines[..., 1], lines[..., 0])
+    return np.abs((turn + 0.5 * np.pi) % np.pi - 0.5 * np.pi).max(1)
 
 
 def _are_clear(
-    saddles: Saddles, near: Float[ndarray, "m 2"], places: ndarray, arm: float | Float[ndarray, " m"]
+    saddles: Saddles, step: Float[ndarray, " m"], arm: float | Float[ndarray, " m"]
 ) -> Bool[ndarray, " m"]:
     """Which saddles have no blurred mark beside them: what is printed on one side only draws them there."""
     if isinstance(arm, float):
-        return np.ones(len(near), dtype=bool)
-    return (arm >= 1.0) | (arm * nearest_neighbour(near, places) > CLEAR_BLURS * saddles.blur)
+        return np.ones(len(step), dtype=bool)
+    return (arm >= 1.0) | (arm * step > CLEAR_BLURS * saddles.blur)
 
 
 def _surroundings(
@@ -160,9 +167,9 @@ def _reduced(grey: ndarray, shrink: int) -> ndarray:
     )
 
 
-def _near(grey: ndarray, corners: ndarray, places: ndarray) -> ndarray:
+def _near(grey: ndarray, corners: Float[ndarray, "m 2"], step: Float[ndarray, " m"]) -> ndarray:
     """cornerSubPix with a window that suits each corner's own squares."""
-    radius = np.clip(np.rint(NEAR_SHARE * nearest_neighbour(corners, places)), 2, LARGEST_REACH).astype(int)
+    radius = np.clip(np.rint(NEAR_SHARE * step), 2, LARGEST_REACH).astype(int)
     places = np.clip(corners, 0, np.array(grey.shape[::-1]) - 1).astype(np.float32)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-2)
     for size in distinct(radius):

@@ -185,7 +185,7 @@ class _Fit:
         every = np.arange(len(self.contrast))
         damped = self.sums[:, :-1, :-1] + np.eye(COLUMN_COUNT) * self._damping(every, self.sums)[:, None]
         scale = self.noise / np.maximum(self.contrast**2, 1e-9)
-        of_columns = np.linalg.inv(damped)[:, :2, :2] * scale[:, None, None]
+        of_columns = np.linalg.solve(damped, np.eye(COLUMN_COUNT)[:, :2])[:, :2] * scale[:, None, None]
         blur, bends = np.maximum(self.shapes.blur, median(self.shapes.blur)), self.shapes.bends
         shapes = Shapes(self.shapes.places, self.shapes.angles, blur, bends, self.shapes.relief)
         units = np.broadcast_to(np.eye(5)[:2], (len(blur), 2, 5))

@@ -19,11 +19,13 @@ class Sight(NamedTuple):
         ids: (n,) rows of the target's points, ascending.
         pixels: (n,2) where they are.
         remark: what a person should know of the choice, as it is told after the target's name; mostly empty.
+        diameter: of discs as they are drawn, metres, told by the distances between them; 0 of others.
     """
 
     ids: Int[ndarray, " n"]
     pixels: Float[ndarray, "n 2"]
     remark: str = ""
+    diameter: float = 0.0
 
 
 class Unseen(NamedTuple):

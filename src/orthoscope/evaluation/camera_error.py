@@ -28,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.evaluation.region import (
+    MARGIN_SHARE,
     REGION_DIRECTIONS,
     REGION_STEPS,
     between,
@@ -235,7 +236,8 @@ def predicted_error(
     seen_px, model_px, alike_px, views_px, bias_px = far.parts
     along = np.sqrt(far.total[part_frame.stop :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
     corners = seen if corners is None else corners
-    region = grown(middle, ways, along, FINE_PX, seen=corners)
+    margin = MARGIN_SHARE * max(width, height)
+    region = grown(middle, ways, along, FINE_PX, seen=corners, margin=margin)
     imaged = _within_cells(np.isfinite(far.total[part_frame]), width, height)
     return CameraError(
         seen_px=seen_px,
@@ -252,7 +254,7 @@ def predicted_error(
         limit_px=FINE_PX,
         region=region,
         share=float(inside(region, imaged).mean()),
-        seen_share=float(between(corners, imaged).mean()),
+        seen_share=float(between(corners, imaged, margin).mean()),
         without_px=np.sqrt(far.moved[part_seen].mean(0)),
     )
 

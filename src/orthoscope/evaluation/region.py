@@ -1,9 +1,9 @@
 """Where in the image a camera may be used: one polygon, and the share of the frame that lies in it.
 
 The region is grown from the middle of the corners that were seen, in every direction as far as the camera's
-error stays below a limit and no farther than their convex hull: beyond the corners, a small predicted error
-rests on a formula that nothing has tested there.  Whoever speaks of the part of the frame where a camera
-holds (the verdict's first sentence, `trusted`, the page's line) speaks of this polygon.
+error stays below a limit and hardly farther than their convex hull: far beyond the corners, a small
+predicted error rests on a formula that nothing has tested there.  Whoever speaks of the part of the frame
+where a camera holds (the verdict's first sentence, `trusted`, the page's line) speaks of this polygon.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Bool, Float, ndarray
 
-__all__ = ["REGION_DIRECTIONS", "REGION_STEPS", "between", "grown", "inside", "ways_from"]
+__all__ = ["MARGIN_SHARE", "REGION_DIRECTIONS", "REGION_STEPS", "between", "grown", "inside", "ways_from"]
 
 # The region is grown in so many directions.
 REGION_DIRECTIONS = 48
 # The region is grown in so many steps.
 REGION_STEPS = 20
+# Places count as between corners up to this share of the frame's longer side beyond them.
+MARGIN_SHARE = 1 / 16
 
 
 def ways_from(
@@ -40,6 +42,7 @@ def grown(
     limit: float,
     *,
     seen: Float[ndarray, "s 2"],
+    margin: float,
 ) -> Float[ndarray, "directions 2"]:
     """The polygon: in each direction the first place where the error is too large, or where corners end; the
     middle where it is too large at once.
@@ -49,6 +52,7 @@ def grown(
         error: along the ways, pixels; NaN where the camera has no image.
         limit: of the error, pixels.
         seen: corners.
+        margin: beyond them, pixels.
     """
     good = error <= limit
     steps = np.where(good.all(1), REGION_STEPS, np.argmin(good, axis=1)).astype(float)
@@ -56,17 +60,20 @@ def grown(
     last, first = error[stopped, steps[stopped].astype(int) - 1], error[stopped, steps[stopped].astype(int)]
     steps[stopped] += np.nan_to_num((limit - last) / (first - last))  # where it crosses the limit
     border = ways[:, -1] - middle
-    along, outwards = _directions(), _directions()
+    along = outwards = _directions()
     with np.errstate(divide="ignore"):
-        beyond = ((seen - middle) @ outwards.T).max(0) / np.maximum(along @ outwards.T, 0.0)
+        beyond = (_ends(seen, margin) - outwards @ middle) / np.maximum(along @ outwards.T, 0.0)
     share = np.minimum(steps / REGION_STEPS, beyond.min(1) / np.linalg.norm(border, axis=1))
     return middle + share[:, None] * border
 
 
-def between(seen: Float[ndarray, "s 2"], pixels: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
-    """Which places lie between corners that were seen: in no direction farther out than all of them."""
-    outwards = _directions()
-    return (pixels @ outwards.T <= (seen @ outwards.T).max(0)).all(1)
+def between(seen: Float[ndarray, "s 2"], pixels: Float[ndarray, "n 2"], margin: float) -> Bool[ndarray, " n"]:
+    """Which places lie between corners that were seen: in no direction farther out than all of them.
+
+    Args:
+        margin: beyond them, pixels.
+    """
+    return (pixels @ _directions().T <= _ends(seen, margin)).all(1)
 
 
 def inside(polygon: Float[ndarray, "n 2"], pixels: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
@@ -77,6 +84,11 @@ def inside(polygon: Float[ndarray, "n 2"], pixels: Float[ndarray, "m 2"]) -> Boo
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = start[:, 0] + (y - start[:, 1]) * (end[:, 0] - start[:, 0]) / (end[:, 1] - start[:, 1])
     return (spans & (x < crossing)).sum(1) % 2 == 1
+
+
+def _ends(seen: Float[ndarray, "s 2"], margin: float) -> Float[ndarray, " directions"]:
+    """How far out corners lie in every direction, and a margin."""
+    return (seen @ _directions().T).max(0) + margin
 
 
 def _directions() -> Float[ndarray, "directions 2"]:

@@ -38,20 +38,24 @@ def near_copies(detections: Detections) -> Int[ndarray, " m"]:
     for table, view in zip(tables, detections.views, strict=True):
         table[view.ids] = view.pixels
     some = evenly(corners, FIRST_CORNERS)
-    cells = np.floor(np.nan_to_num(tables[:, some], nan=-1e9) / near).astype(np.int64)
     seen = np.isfinite(tables[:, some, 0])
+    far = (
+        -10.0 * near * np.arange(1.0, views + 1.0)[:, None, None]
+    )  # where a corner was not seen: near to none
+    x, y = (
+        np.floor(np.where(seen[..., None], tables[:, some], far) / near).astype(np.int32).transpose(2, 0, 1)
+    )
     number = np.zeros(views, dtype=np.int64)
     kept = np.zeros(views, dtype=np.int64)  # the first so many: views that copy none before them
-    count = 0
+    at_x, at_y, count = np.empty_like(x), np.empty_like(y), 0  # of those that are kept
     for i in range(views):
-        before = kept[:count]
         # A corner that moved by less than a cell lies in its own cell or in one of those around it.
-        close = (np.abs(cells[before] - cells[i]) <= 1).all(-1) & seen[before] & seen[i]
+        close = (np.abs(at_x[:count] - x[i]) <= 1) & (np.abs(at_y[:count] - y[i]) <= 1)
         perhaps = np.flatnonzero(close.any(1)) if seen[i].any() else range(count)
         same = [n for n in perhaps if _is_copy(tables[kept[n]], tables[i], near)]
         number[i] = same[0] if same else count
         if not same:
-            kept[count] = i
+            kept[count], at_x[count], at_y[count] = i, x[i], y[i]
             count += 1
     number.setflags(write=False)
     return number

@@ -18,7 +18,7 @@ from orthoscope.fitting.identifiability import LEAST_NOISE_PX
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.methods.mldc.lens_about_centre import CENTRE, GAUGE
+from orthoscope.methods.mldc.lens_about_centre import CENTRE, SCALE
 from orthoscope.models.camera import Camera
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
@@ -57,7 +57,7 @@ def with_own_centre(
     """
     camera = near.camera.with_unit_scale()
     K = camera.intrinsics
-    shape = tuple(name for name in coefficients if name != GAUGE.get(type(camera.lens)))
+    shape = tuple(name for name in coefficients if name != SCALE.get(type(camera.lens)))
     free = (
         *(f"{name}=frame_scale" if name.startswith("fx") else name for name in of_pinhole),
         *shape,

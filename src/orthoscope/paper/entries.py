@@ -141,6 +141,10 @@ def own_entry(text: str) -> PaperEntry:
     """
     head, equals, tail = text.partition("=")
     name, what = (head, tail) if equals and ":" not in head else (text, text)
+    if not name:
+        raise InputError(
+            f"--with {text!r} has no name before its '='; expected such as mine=module:function."
+        )
     module, _, attribute = what.partition(":")
     if module in METHODS:
         entry = parse_entry(what)

@@ -148,7 +148,7 @@ class Plan:
         few: dict[str, Any] = {
             "trials": 2,
             "board": (6, 9),
-            "noise_px": (0.0, 0.5),
+            "noise_px": (PAPER_NOISE_PX, 0.5),
             "points": ((3, 4), (6, 9)),
             "images": (1, 4),
             "lenses": ("brown",),

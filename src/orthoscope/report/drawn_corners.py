@@ -23,5 +23,5 @@ def drawn_corners(view: View, image_size: tuple[int, int]) -> Html:
     width, height = image_size
     some = evenly(len(view.pixels), MOST_DRAWN) if len(view.pixels) else []
     dots = "".join(f"M{round(x)} {round(y)}h0" for x, y in view.pixels[some].tolist())
-    path = tag("path", d=dots, **{"stroke-width": round(max(width, height) / SIDES_OF_DOT, 1)})
+    path = tag("path", d=dots, stroke_width=f"{max(width, height) / SIDES_OF_DOT:.1f}")
     return tag("svg", path, viewBox=f"0 0 {width} {height}", class_="no-picture", aria_hidden="true")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from orthoscope.evaluation.evaluate import Evaluation
-from orthoscope.geometry.numbers import ABSENT, pixels
+from orthoscope.geometry.numbers import ABSENT, percent, pixels
 from orthoscope.report import tables
 from orthoscope.report.data.views import suspects_of
 from orthoscope.report.drawn_corners import drawn_corners
@@ -84,7 +84,11 @@ def _trust(trusted: Any, pictures: Pictures) -> Html:
     title = "Where it may be trusted"
     if isinstance(trusted, str):
         return _empty("trust", title, trusted)
-    caption = "Colour: predicted error in pixels. Within the line the camera may be used."
+    share = "" if trusted["share"] is None else f", {percent(trusted['share'])} of the frame,"
+    where = f"Within the line{share} the camera may be used."
+    if trusted["share"] == 0.0:
+        where = f"It is more than {trusted['limit']:g} px everywhere."
+    caption = f"Colour: predicted error in pixels. {where}"
     return figure("trust", title, caption, TRUST)
 
 

@@ -46,6 +46,8 @@ MOST_DAMPING = 1e12
 LARGEST_OPEN_EIGENVALUE = 1e-14
 # Views are eliminated so many numbers at a time (16 MB).
 NUMBERS_AT_ONCE = 1 << 21
+# Blocks of more unknowns are not inverted, and solved so many rows at a time.
+WIDEST_INVERTED = 64
 # An unknown that has at least this share (squared) in such a direction is open too.
 OPEN_SHARE = 1e-8
 
@@ -299,18 +301,56 @@ def _lowered(sums: NormalEquations, promised: float) -> NormalEquations:
 def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndarray, ndarray, float]:
     """Shared step, view steps and what the quadratic model promises to take off the cost; NaN for no step."""
     of_shared, of_views = damping * _weights(sums.A, damp), damping * _weights(sums.C, damp)
+    C = sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2])
     try:
-        roots = inverse_roots(sums.C + of_views[:, :, None] * np.eye(sums.C.shape[2]))
-        inverse = roots @ roots.transpose(0, 2, 1)
-        by_views = (inverse @ sums.c[:, :, None])[:, :, 0]
-        system = eliminated(sums, roots)
+        system, solved = (_with_triangles if C.shape[2] > WIDEST_INVERTED else _with_inverses)(sums, C)
         system[np.diag_indices_from(system)] += of_shared
-        shared = -np.linalg.solve(system, sums.a - np.einsum("mkp,mp->k", sums.B, by_views))
+        shared = -np.linalg.solve(system, sums.a - np.einsum("mkp,mp->k", sums.B, solved(sums.c)))
     except np.linalg.LinAlgError:  # singular as far as numbers go
         return np.zeros_like(sums.a), np.zeros_like(sums.c), float("nan")
-    views = -(inverse @ (sums.c + shared @ sums.B)[:, :, None])[:, :, 0]
+    views = -solved(sums.c + shared @ sums.B)
     damped = of_shared @ shared**2 + (of_views * views**2).sum()
     return shared, views, float(-(sums.a @ shared) - (sums.c * views).sum() + damped)
+
+
+def _with_inverses(
+    sums: NormalEquations, C: Float[ndarray, "m p p"]
+) -> tuple[ndarray, Callable[[ndarray], ndarray]]:
+    """The shared system, and what takes (m,p) to C^-1 of it, by the inverse of each block.
+
+    Raises:
+        LinAlgError: a block is not positive, as far as numbers go.
+    """
+    roots = inverse_roots(C)
+    inverse = roots @ roots.transpose(0, 2, 1)
+    return eliminated(sums, roots), lambda right: (inverse @ right[:, :, None])[:, :, 0]
+
+
+def _with_triangles(
+    sums: NormalEquations, C: Float[ndarray, "m p p"]
+) -> tuple[ndarray, Callable[[ndarray], ndarray]]:
+    """The same for wide blocks, of which an inverse takes many times the work that a few solutions take.
+
+    Raises:
+        LinAlgError: a block is not positive, as far as numbers go.
+    """
+    L = np.linalg.cholesky(C)
+    system = sums.A - (sums.B @ _by_triangles(L, sums.B.transpose(0, 2, 1))).sum(0)
+    return system, lambda right: _by_triangles(L, right[:, :, None])[:, :, 0]
+
+
+def _by_triangles(L: Float[ndarray, "m p p"], right: Float[ndarray, "m p r"]) -> Float[ndarray, "m p r"]:
+    """C^-1 right of each block C = L L', forwards and backwards, some rows at a time."""
+    solved, starts = right.copy(), range(0, L.shape[1], WIDEST_INVERTED)
+    for start in starts:
+        rows = slice(start, start + WIDEST_INVERTED)
+        solved[:, rows] -= L[:, rows, :start] @ solved[:, :start]
+        solved[:, rows] = np.linalg.solve(L[:, rows, rows], solved[:, rows])
+    for start in reversed(starts):
+        rows, after = slice(start, start + WIDEST_INVERTED), slice(start + WIDEST_INVERTED, None)
+        solved[:, rows] -= L[:, after, rows].transpose(0, 2, 1) @ solved[:, after]
+        solved[:, rows] = np.linalg.solve(L[:, rows, rows].transpose(0, 2, 1), solved[:, rows])
+    return solved
 
 
 def eliminated(sums: NormalEquations, roots: Float[ndarray, "m p p"]) -> Float[ndarray, "k k"]:

@@ -58,7 +58,7 @@ class Circles(Board):
                 f" such as {self.example}."
             )
         few = min(self.columns, self.rows) < 2 or self.columns * self.rows < FEWEST_DISCS
-        if few or not 0 < self.diameter < NEAREST_STEPS[self.layout] * self.spacing < np.inf:
+        if few or not 0 < self.diameter < self.nearest < np.inf:
             raise InputError(
                 f"a grid of {self.columns}x{self.rows} circles {self.spacing:g} m apart with diameters of"
                 f" {self.diameter:g} m cannot be used; expected at least {FEWEST_DISCS} that do not"
@@ -87,6 +87,11 @@ class Circles(Board):
     @property
     def disc_radius(self) -> float:
         return 0.5 * self.diameter
+
+    @property
+    def nearest(self) -> float:
+        """From a disc to the next, metres."""
+        return NEAREST_STEPS[self.layout] * self.spacing
 
     def places(self) -> Float[ndarray, "m 2"]:
         places = super().places()

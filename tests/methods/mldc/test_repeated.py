@@ -65,6 +65,16 @@ def test_repeated_ends_at_the_joint_minimum_in_few_rounds(scene, nce):
     assert evaluate_on(fccm(training, lens="brown:k1,k2").camera, test).nce > 4 * nce
 
 
+def test_the_straight_image_has_the_photographs_scale_at_the_centre_for_every_lens():
+    """Or the normalised error, which is in units of fx, would go with a convention of the formula."""
+    training, test = simulated("low", Condition(subgrid=(6, 9)), seed=0, trial=0)
+    mine, joint = mldc(training, lens="fet"), fccm(training, lens="fet", own_centre=True)
+    assert mine.camera.intrinsics.fx == pytest.approx(joint.camera.intrinsics.fx, rel=0.01)
+    assert "l" in joint.uncertainty.names
+    nce = [evaluate_on(one.camera, test).nce for one in (mine, joint)]
+    assert nce[0] == pytest.approx(nce[1], rel=0.01)
+
+
 def test_no_round_raises_the_cost():
     costs = []
     mldc(photographed(NARROW, 5, noise_px=0.3), progress=lambda number, cost: costs.append(cost))

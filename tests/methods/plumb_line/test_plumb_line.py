@@ -5,11 +5,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from numpy import ndarray
+from benchmarks.studies.plumb_line import STREET_LENSES, apart, street_edges
+from benchmarks.studies.streets import street_camera
 from numpy.testing import assert_allclose
 
 from helpers.real_sets import classic
-from helpers.streets import street_camera, street_photograph
 from orthoscope.files.images import write_image
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.fccm import fccm
@@ -17,36 +17,23 @@ from orthoscope.methods.plumb_line.division import division_of_edges
 from orthoscope.methods.plumb_line.edges import Edge, edges_of
 from orthoscope.methods.plumb_line.photographs import lens_of_photographs
 from orthoscope.methods.plumb_line.plumb_line import lens_of_edges
-from orthoscope.models.camera import Camera
-from orthoscope.models.difference import frame_grid
 from orthoscope.models.lenses import Brown, Division
 
 SIZE = (640, 480)
 BARREL = Brown(k1=-0.28, k2=0.08)
 
 
-def apart(camera: Camera, truth: Camera, pixels: ndarray | None = None) -> ndarray:
-    """How far off a camera's straight image is over the frame, or at pixels of the photograph; but for a
-    homography, which no line tells.
-    """
-    pixels = frame_grid(SIZE) if pixels is None else pixels
-    found, true = camera.undistort_pixels(pixels), truth.undistort_pixels(pixels)
-    to_true = cv2.findHomography(found, true, 0)[0]
-    carried = cv2.perspectiveTransform(found[None], to_true)[0]
-    return np.hypot(*(truth.distort_pixels(carried) - pixels).T)
-
-
-def streets(truth: Camera, count: int, seed: int = 0) -> list[Edge]:
-    rng = np.random.default_rng(seed)
-    return [edge for i in range(count) for edge in edges_of(street_photograph(truth, rng=rng), i)]
-
-
 @pytest.mark.parametrize(
-    "lens", [BARREL, *(pytest.param(lens, marks=pytest.mark.slow) for lens in (Division(l=-0.35), Brown()))]
+    "name",
+    [
+        name if name == "strong barrel" else pytest.param(name, marks=pytest.mark.slow)
+        for name in STREET_LENSES
+    ],
 )
-def test_three_streets_tell_the_lens_within_a_pixel_over_the_frame(lens):
-    truth = street_camera(lens)
-    found = lens_of_edges(streets(truth, 3), SIZE)
+def test_three_streets_tell_the_lens_within_a_pixel_over_the_frame(name):
+    lens, focal = STREET_LENSES[name]
+    truth = street_camera(lens, focal=focal)
+    found = lens_of_edges(street_edges(truth, seed=1), SIZE)
     assert apart(found.camera, truth).max() < 1.0
     assert 0.05 < found.rms_px < 0.12  # the noise of an edge, not of what is bent in space
 
@@ -55,7 +42,7 @@ def test_three_streets_tell_the_lens_within_a_pixel_over_the_frame(lens):
 def test_what_is_bent_in_space_is_left_out():
     """Nine facades' edges in ten are taken, of cables and crowns next to none."""
     truth = street_camera(BARREL)
-    found = lens_of_edges(streets(truth, 2), SIZE)
+    found = lens_of_edges(street_edges(truth, 0, 2), SIZE)
     straight = [truth.undistort_pixels(edge.pixels) for edge in found.edges]
     bent = np.array(
         [np.linalg.svd(p - p.mean(0), full_matrices=False)[1][1] / len(p) ** 0.5 for p in straight]
@@ -110,7 +97,7 @@ def test_too_few_edges_are_refused_and_so_is_a_lens_that_is_none():
     with pytest.raises(CalibrationError, match="edges long enough"):
         lens_of_edges(edges_of(np.full((480, 640), 128, np.uint8)), SIZE)
     with pytest.raises(InputError):
-        lens_of_edges(streets(street_camera(BARREL), 1), SIZE, lens="nolens")
+        lens_of_edges(street_edges(street_camera(BARREL), 0, 1), SIZE, lens="nolens")
 
 
 def test_photographs_of_two_sizes_have_no_one_lens(tmp_path):

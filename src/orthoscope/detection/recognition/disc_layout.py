@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from orthoscope.detection.copies import resized
-from orthoscope.detection.disc_lattice import numbered
+from orthoscope.detection.disc_lattice import diameter_in_steps, numbered
 from orthoscope.detection.disc_outlines import refined_discs, spots
-from orthoscope.geometry.arrays import Float, Int, ndarray
+from orthoscope.geometry.arrays import Int, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.board import Board
 from orthoscope.targets.circles import Circles
@@ -40,7 +40,7 @@ def disc_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
                 layout = _layout(places) if len(which) >= FEWEST_DISCS else None
                 if layout and len(which) > best[0]:
                     discs = refined_discs(picture, Ellipses(found.centres[which], found.axes[which])).ellipses
-                    best = len(which), layout, _diameter(discs, places)
+                    best = len(which), layout, diameter_in_steps(discs, places)
             if best[0]:
                 seen[best[1]] += 1
                 diameters.append(best[2])
@@ -62,23 +62,3 @@ def _layout(places: Int[ndarray, "n 2"]) -> tuple[int, int, str] | None:
         return None
     columns, rows = (across // 2, down) if across % 2 == 0 else (down // 2, across)
     return columns, rows, "asymmetric"
-
-
-def _inverses(axes: Float[ndarray, "n 2 2"]) -> Float[ndarray, "n 2 2"]:
-    """NaN for discs without an outline."""
-    whole = np.asarray(np.isfinite(axes).all((1, 2)))
-    return np.where(
-        whole[:, None, None], np.linalg.inv(np.where(whole[:, None, None], axes, np.eye(2))), np.nan
-    )
-
-
-def _diameter(discs: Ellipses, places: Int[ndarray, "n 2"]) -> float:
-    """A disc's diameter over its distance from the next, as its own ellipse's frame has it."""
-    inverse, lookup = _inverses(discs.axes), {tuple(place): i for i, place in enumerate(places.tolist())}
-    far = [
-        float(np.hypot(*(inverse[i] @ (discs.centres[other] - discs.centres[i]))))
-        for place, i in lookup.items()
-        for step in ((1, 0), (0, 1))
-        if (other := lookup.get((place[0] + step[0], place[1] + step[1]))) is not None
-    ]
-    return 2.0 / float(np.nanmedian(far)) if np.isfinite(far).any() else 0.0

@@ -17,9 +17,9 @@ from orthoscope.evaluation.verdict.situation import COARSE_PX, FINE_PX, NEAR_PX,
 
 __all__ = ["GRADES", "WIDE_SHARE", "Grade", "by_error", "good_somewhere", "lower"]
 
-# A camera holds widely over this share of the frame: fifteen photographs of a board that is led all over the
-# frame have their corners in 70 % of it, since the board's own margin keeps them from its border.
-WIDE_SHARE = 0.6
+# A camera holds widely over this share of the frame; what is left is corners of it that a board rarely
+# reaches.
+WIDE_SHARE = 0.7
 # A camera that is off by no more at the target's distances, pixels, is good there.
 NEAR_FINE_PX = 0.25
 # One that is good there only may be off by no more far away, pixels.

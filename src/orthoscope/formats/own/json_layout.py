@@ -9,6 +9,7 @@ numbers are very small or very large.
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import msgspec
@@ -17,13 +18,8 @@ __all__ = ["lay_out"]
 
 # An object of plain values that fits in so many characters stays on one line.
 LINE_WIDTH = 120
-OTHERWISE = (
-    "e",
-    "0.0000",
-    "n",
-    '"',
-    "{",
-)  # in msgspec's text: numbers that Python writes in another way, NaN, what is no number
+# In msgspec's text: numbers that Python writes in another way, NaN, what is no number.
+OTHERWISE = re.compile(r'e|0\.0000|[n"{]')
 
 
 def lay_out(value: Any, indent: str = "") -> str:
@@ -47,7 +43,9 @@ def lay_out(value: Any, indent: str = "") -> str:
         return _block(
             "{}", [f"{_line(str(key))}: {lay_out(entry, inner)}" for key, entry in value.items()], indent
         )
-    if isinstance(entries[0], list | tuple):
+    if isinstance(entries[0], list | tuple) and not any(
+        isinstance(cell, list | tuple) for cell in entries[0]
+    ):
         line = _table(value)
         if (
             not line.startswith("[[[") and '"' not in line and "{" not in line
@@ -69,18 +67,13 @@ def _table(value: Any) -> str:
     it.
     """
     text = msgspec.json.encode(value).decode()
-    if not _is_otherwise(text):
-        return text.replace(",", ", ")
-    rows = text[2:-2].split("],[")
-    plain = '"' not in text and "{" not in text and not text.startswith("[[[") and text.endswith("]]")
-    if not plain or len(rows) != len(value):
-        return _line(value)
-    written = [
-        _line(entries) if _is_otherwise(row) else f"[{row.replace(',', ', ')}]"
-        for row, entries in zip(rows, value, strict=True)
-    ]
-    return f"[{', '.join(written)}]"
-
-
-def _is_otherwise(text: str) -> bool:
-    return any(sign in text for sign in OTHERWISE)
+    if OTHERWISE.search(text):
+        rows = text[2:-2].split("],[")
+        plain = '"' not in text and "{" not in text and not text.startswith("[[[") and text.endswith("]]")
+        if not plain or len(rows) != len(value):
+            return _line(value)
+        for i, row in enumerate(rows):
+            if OTHERWISE.search(row):
+                rows[i] = _line(value[i])[1:-1].replace(", ", ",")
+        text = f"[[{'],['.join(rows)}]]"
+    return text.replace(",", ", ")

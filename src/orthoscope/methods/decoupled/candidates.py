@@ -44,9 +44,11 @@ class Candidates:
         self.detections, self._skew = detections, skew
         self._photographs = near_copies(detections)
         self._fitter = fitter or Kept(detections, skew=skew)
-        of_some = self._fitter.of_some if isinstance(self._fitter, Kept) else self._fitter
+        of_some = self._fitter.of_some if isinstance(self._fitter, Kept) else None
         self.of_some = (
-            self if of_some is self._fitter else Candidates(of_some.detections, skew=skew, fitter=of_some)
+            self
+            if of_some is None or of_some is self._fitter
+            else Candidates(of_some.detections, skew=skew, fitter=of_some)
         )
         self.flat, self.step_one = cache(self._fitter.flat), cache(self._fitter.step_one)
         # Large, of many views; what is asked for of one model is asked for together.

@@ -35,10 +35,12 @@ def representative(detections: Detections, views: int) -> Detections:
 
 def _places(detections: Detections) -> Float[ndarray, "m 5"]:
     """Of each view its middle and the second moments of its corners, each in units of its own spread."""
-    rows = []
-    for view in detections.views:
-        middle = view.pixels.mean(0)
-        (xx, xy), (_, yy) = np.cov(view.pixels.T)
-        rows.append([*middle, np.sqrt(xx), np.sqrt(yy), xy / np.sqrt(max(xx * yy, 1e-300))])
-    places = np.array(rows)
+    counts = np.array([len(view.pixels) for view in detections.views])
+    x, y = np.concatenate([view.pixels for view in detections.views]).T
+    starts = np.cumsum(counts) - counts
+    middle = np.stack([np.add.reduceat(along, starts) / counts for along in (x, y)])
+    x, y = np.stack([x, y]) - np.repeat(middle, counts, axis=1)
+    xx, xy, yy = (np.add.reduceat(product, starts) / (counts - 1) for product in (x * x, x * y, y * y))
+    turn = xy / np.sqrt(np.maximum(xx * yy, 1e-300))
+    places = np.stack([*middle, np.sqrt(xx), np.sqrt(yy), turn], axis=1)
     return places / np.maximum(places.std(0), 1e-300)

@@ -86,9 +86,12 @@ class Eq7:
         self._runs = lines.present[:, 3:]  # which four consecutive seen corners of a line there are, (l, r)
         with np.errstate(invalid="ignore", divide="ignore"):  # in the padding
             self._ratio = cross_ratio(_fours(self._points[lines.row[:, None], lines.column, :2]))
-        self._of_line = (
-            POSE + 2 * lines.column[..., None] + np.arange(2)
-        )  # (l, w, 2): places of a line's unknowns in its view's block
+        # Where the unknowns of each line stand in c of all views, and each pair of them in C, laid out flat.
+        width = POSE + 2 * self._present.shape[1]
+        of_line = (POSE + 2 * lines.column[..., None] + np.arange(2)).reshape(len(lines.row), -1)
+        of_view = lines.row[:, None] * width + of_line
+        self._in_c = of_view.ravel()
+        self._in_C = (of_view[:, :, None] * width + of_line[:, None, :]).ravel()
 
     def start(self, pinhole: Estimate, observations: Observations) -> CorrectedPoints:
         """The paper's start: the pin-hole given, the points where the corners were detected."""
@@ -186,14 +189,10 @@ class Eq7:
 
     def _add(self, C: Float[ndarray, "m p p"], c: Float[ndarray, "m p"], weight: float, terms: Terms) -> None:
         """Adds D^T D and D^T r of the lines to the blocks of their views."""
-        row, place = self._lines.row, self._of_line.reshape(len(self._lines.row), -1)
-        D = terms.slope.reshape(*terms.residual.shape, place.shape[1])
-        np.add.at(
-            C, (row[:, None, None], place[:, :, None], place[:, None, :]), weight * (D.transpose(0, 2, 1) @ D)
-        )
-        np.add.at(
-            c, (row[:, None], place), weight * (D.transpose(0, 2, 1) @ terms.residual[:, :, None])[:, :, 0]
-        )
+        D = terms.slope.reshape(*terms.residual.shape, -1)
+        turned = weight * D.transpose(0, 2, 1)
+        C += np.bincount(self._in_C, (turned @ D).ravel(), C.size).reshape(C.shape)
+        c += np.bincount(self._in_c, (turned @ terms.residual[:, :, None]).ravel(), c.size).reshape(c.shape)
 
 
 def _fours(points: Float[ndarray, "l w 2"]) -> Float[ndarray, "l r 4 2"]:

@@ -42,6 +42,7 @@ from orthoscope.solve.losses import Loss
 __all__ = [
     "CENTRE",
     "GAUGE",
+    "SCALE",
     "fit_centred_lens",
     "paired_parameters",
     "parse_centred_lens",

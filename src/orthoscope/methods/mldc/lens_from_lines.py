@@ -11,7 +11,7 @@ lens's own camera has the lens frame for its K: cx and cy are the distortion cen
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -25,7 +25,7 @@ from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, straightened_parameters
 from orthoscope.methods.mldc.line_residuals import Straightness
 from orthoscope.methods.mldc.lines_in_views import SeenLines
-from orthoscope.methods.mldc.straightened_lines import StraightenedLines
+from orthoscope.methods.mldc.straightened_lines import StraightenedLines, by_lens
 from orthoscope.models.camera import Camera, Intrinsics
 from orthoscope.models.charts import EQUIDISTANT
 from orthoscope.models.lens import Formula
@@ -74,9 +74,20 @@ class StraightLens(NamedTuple):
     assumptions: tuple[str, ...]
     solution: Solution[Any]
 
-    def moved(self, step: Float[ndarray, " k"]) -> Camera:
-        """The lens's own camera after a step of the free parameters."""
-        return Parameters.of(OWN_NAMES.get(name, name) for name in self.free).moved(self.camera, step)
+    def straight_slopes(
+        self, names: Sequence[str], pixels: Float[ndarray, "2 *batch"]
+    ) -> Float[ndarray, "k 2 *batch"]:
+        """How straight pixels, those of the lens's own camera without its lens, move with free parameters,
+        where corners stay in the photograph.
+        """
+        K, shape = self.camera.intrinsics, pixels.shape
+        x = (pixels.reshape(2, -1) - [[K.cx], [K.cy]]) / K.fx
+        parameters = Parameters.of(OWN_NAMES.get(name, name) for name in names)
+        slopes = K.fx * by_lens(self.camera, x, parameters)
+        moved_frame = {"centre_x": [[1.0], [0.0]], "centre_y": [[0.0], [1.0]], SCALE: x}
+        for slope, name in zip(slopes, names, strict=True):
+            slope += moved_frame.get(name, 0.0)
+        return slopes.reshape(-1, *shape)
 
 
 def fit_straight_lens(

@@ -39,8 +39,9 @@ __all__ = ["LinesOfSight", "Straightness"]
 # A foot is given so many steps; each gains as many digits as the distance is short against the curve's
 # radius.
 FOOT_STEPS = 8
-# A foot that moves less, radians, has been found.
-SETTLED_STEP = 1e-12
+# A foot that moves less, radians, has been found: what is left to go is far less, and a distance is
+# wrong by the square of that.
+SETTLED_STEP = 1e-8
 # Nothing of a camera is moved.
 NO_PARAMETERS = Parameters(())
 # A foot never moves farther at once than this, radians.
@@ -157,7 +158,8 @@ class Straightness:
         self, unknowns: LinesOfSight
     ) -> tuple[Float[ndarray, "3 n"], Float[ndarray, "3 n"], Float[ndarray, "3 n"]]:
         """P of each foot, dP/dt and the normal of its line."""
-        a, b, n = np.moveaxis(unknowns.frames[self._line], -1, 0).transpose(0, 2, 1)
+        axes = np.ascontiguousarray(unknowns.frames.transpose(2, 1, 0))
+        a, b, n = axes[:, :, self._line]
         cosine, sine = np.cos(unknowns.feet), np.sin(unknowns.feet)
         return a * cosine + b * sine, b * cosine - a * sine, n
 

@@ -34,7 +34,7 @@ from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
 from orthoscope.methods.mldc.lens_from_lines import MEASURES, StraightLens, fit_straight_lens
 from orthoscope.models.camera import WIDEST_ANGLE, Camera
 from orthoscope.models.lenses import lens_name
-from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance
+from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, shared_covariance
 from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Linear
 from orthoscope.targets.detections import Detections, View
 from orthoscope.version import __version__
@@ -46,8 +46,6 @@ __all__ = ["nmldc"]
 COST_TOLERANCE = 1e-6
 # No step is worth while for less than this, px^2 (noise-free corners).
 COST_FLOOR = 1e-14
-# A lens that is a little off moves the lines by this, pixels.
-NEARBY_PX = 1e-3
 
 
 @with_one_thread
@@ -111,7 +109,7 @@ def nmldc(
     camera = Camera(used.image_size, pinhole.unknowns.camera.intrinsics, own.lens, lens_frame=own.intrinsics)
     poses, seen = bases.observations.poses_in_order(pinhole.unknowns.poses), _of_same_images(used, within)
     _check_sees(camera, poses, seen)
-    uncertainty, said = _uncertainty(bent, within, bases, pinhole)
+    uncertainty, said = _uncertainty(bent, within.corners, bases, pinhole)
     return Calibration(
         camera=camera,
         camera_from_target=poses,
@@ -175,20 +173,11 @@ def _of_same_images(detections: Detections, others: Detections) -> Detections:
     )
 
 
-def _bases(
-    detections: Detections, own: Camera, narrowing: Assumptions, *, fallback: Camera | None = None
-) -> StartingCameras:
-    """The corners as the lens's own camera would see them without its lens, ready for the pin-hole.
-
-    Args:
-        fallback: the camera for corners that the first does not reach.
-    """
+def _bases(detections: Detections, own: Camera, narrowing: Assumptions) -> StartingCameras:
+    """The corners as the lens's own camera would see them without its lens, ready for the pin-hole."""
 
     def straight(view: View) -> View:
-        pixels = own.undistort_pixels(view.pixels)
-        if fallback:
-            pixels = np.where(np.isfinite(pixels), pixels, fallback.undistort_pixels(view.pixels))
-        return View(view.image, view.ids, pixels)
+        return View(view.image, view.ids, own.undistort_pixels(view.pixels))
 
     corrected = replace(detections, views=tuple(straight(view) for view in detections.views))
     return StartingCameras(
@@ -197,7 +186,7 @@ def _bases(
 
 
 def _uncertainty(
-    bent: StraightLens, within: Detections, bases: StartingCameras, pinhole: Solution[Estimate]
+    bent: StraightLens, corners: int, bases: StartingCameras, pinhole: Solution[Estimate]
 ) -> tuple[Uncertainty, tuple[str, ...]]:
     """Covariance of K and lens together, and what to say of parameters that are open.
 
@@ -206,35 +195,31 @@ def _uncertainty(
     carried over.
     """
     lens, said = told(bent.free, bent.covariance)
-    slopes = _pinhole_by_lens(bent, lens.names, within, bases, pinhole)
+    slopes = _pinhole_by_lens(bent, lens.names, bases, pinhole)
     carried = slopes @ lens.covariance
-    of_pinhole = shared_covariance(pinhole.sums, 2 * within.corners) + carried @ slopes.T
+    of_pinhole = shared_covariance(pinhole.sums, 2 * corners) + carried @ slopes.T
     joint = np.block([[of_pinhole, carried], [carried.T, lens.covariance]])
     return Uncertainty((*bases.narrowing.free, *lens.names), joint), said
 
 
 def _pinhole_by_lens(
-    bent: StraightLens,
-    names: tuple[str, ...],
-    within: Detections,
-    bases: StartingCameras,
-    pinhole: Solution[Estimate],
+    bent: StraightLens, names: tuple[str, ...], bases: StartingCameras, pinhole: Solution[Estimate]
 ) -> Float[ndarray, "k p"]:
-    """How the parameters of K move with these of the lens: where a little more and a little less of each
-    sends a Gauss-Newton step.
+    """How the parameters of K move with these of the lens: by a Gauss-Newton step after the straight corners.
+
+    The residuals' derivatives by K and poses, times how the corners move, are what a problem with moved
+    corners has on its right.
     """
+    seen, free = bases.observations, bases.narrowing.free
 
-    def step_of(lens_step: ndarray) -> ndarray:
-        nearby = _bases(within, bent.moved(lens_step), bases.narrowing, fallback=bent.camera)
-        problem = Reprojection(
-            nearby.observations, nearby.points, pinhole.unknowns.camera, bases.narrowing.free
-        )
-        sums = problem.linearise(pinhole.unknowns, Linear())
-        of_poses = sums.B @ np.linalg.inv(sums.C)
-        eliminated = sums.A - (of_poses @ sums.B.transpose(0, 2, 1)).sum(0)
-        return -np.linalg.solve(eliminated, sums.a - (of_poses @ sums.c[:, :, None]).sum(0)[:, 0])
+    def sums_of(observations: Observations) -> NormalEquations:
+        problem = Reprojection(observations, bases.points, pinhole.unknowns.camera, free)
+        return problem.linearise(pinhole.unknowns, Linear())
 
-    little = np.diag(NEARBY_PX / np.sqrt(np.diag(bent.solution.sums.A) / within.corners))
-    moved = [bent.free.index(name) for name in names]
-    slopes = [(step_of(little[i]) - step_of(-little[i])) / (2.0 * little[i, i]) for i in moved]
-    return np.array(slopes).reshape(len(names), len(bases.narrowing.free)).T
+    here = sums_of(seen)
+    of_poses = here.B @ np.linalg.inv(here.C)
+    slopes = bent.straight_slopes(names, np.stack([seen.u, seen.v])) * seen.present
+    moved = [sums_of(replace(seen, u=seen.u + by_u, v=seen.v + by_v)) for by_u, by_v in slopes]
+    right = [(of_poses @ (here.c - there.c)[:, :, None]).sum(0)[:, 0] - (here.a - there.a) for there in moved]
+    eliminated = here.A - (of_poses @ here.B.transpose(0, 2, 1)).sum(0)
+    return np.linalg.solve(eliminated, np.array(right).reshape(len(names), len(free)).T)

@@ -17,15 +17,15 @@ theta_new the next round starts from theta + (I - M)^-1 (theta_new - theta), if 
 else from a shorter step the same way. That difference, in pixels, is the way still to go; a round's own step
 says little of it.
 
-The size of the straight image is a gauge (K stretched about the centre, coefficients scaled): a slope a1 of
-the centre is held at 1 and K stretched instead.
+The size of the straight image is a gauge (K stretched about the centre, coefficients scaled): a slope at the
+centre is 1 at the end and K stretched instead, or errors that are told in units of fx would go with it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,8 @@ from orthoscope.methods.mldc.lens_about_centre import (
 )
 from orthoscope.methods.mldc.pairs import pairs_of
 from orthoscope.models.camera import Camera, image_border
+from orthoscope.models.lens import Lens
+from orthoscope.models.lenses import Fet, Pfet
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
@@ -196,19 +198,36 @@ def _through_stages(bases: StartingCameras, nearest: Estimate, lens: str, loss: 
 
 
 def in_gauge(camera: Camera, of_pinhole: Sequence[str]) -> Camera:
-    """The same image with slope 1 at the centre: K stretched about it instead, so far as K's parameters"
-    " move."""
-    name, frame = GAUGE.get(type(camera.lens)), camera.lens_frame
-    if name != "a1" or frame is None:
+    """The same image with slope 1 at the centre: K stretched about it instead, so far as K's parameters
+    move.
+    """
+    frame, gauge = camera.lens_frame, UNIT_SLOPES.get(type(camera.lens))
+    if gauge is None or frame is None:
         return camera
-    a1 = float(getattr(camera.lens, name))
-    values = {f"a{t}": float(getattr(camera.lens, f"a{t}")) / a1**t for t in range(6)}
+    slope, values = gauge(camera.lens)
     K = camera.intrinsics
-    stretched = replace(K, fx=a1 * K.fx, fy=a1 * K.fy, skew=a1 * K.skew)
+    stretched = replace(K, fx=slope * K.fx, fy=slope * K.fy, skew=slope * K.skew)
     if set(FOCAL) <= set(of_pinhole):
-        cx, cy = frame.cx + a1 * (K.cx - frame.cx), frame.cy + a1 * (K.cy - frame.cy)
+        cx, cy = frame.cx + slope * (K.cx - frame.cx), frame.cy + slope * (K.cy - frame.cy)
         stretched = replace(stretched, cx=cx, cy=cy)
     return replace(camera, intrinsics=stretched, lens=camera.lens.with_coefficients(**values))
+
+
+def _of_polynomial(lens: Pfet) -> tuple[float, dict[str, float]]:
+    """The slope at the centre, and the coefficients of the curve over a radius that is so much larger."""
+    return lens.a1, {f"a{t}": getattr(lens, f"a{t}") / lens.a1**t for t in range(6)}
+
+
+def _of_logarithm(lens: Fet) -> tuple[float, dict[str, float]]:
+    """The same of s log(1 + l r)."""
+    return lens.scale * lens.l, {"l": 1.0 / lens.scale}
+
+
+# Of lenses that have a slope of their own at the centre.
+UNIT_SLOPES: dict[type[Lens], Callable[[Any], tuple[float, dict[str, float]]]] = {
+    Pfet: _of_polynomial,
+    Fet: _of_logarithm,
+}
 
 
 class _Round(NamedTuple):
@@ -251,13 +270,19 @@ class _Repetition:
             if progress:
                 progress(number, here.cost)
             if ended.settled or number == rounds:
-                return Rounds(here.estimate, here.cost, ended, sums)
+                return self._outcome(here, ended)
             last = here.cost
             before, here = self._onward(before, here, way)
             if here.cost > last * (1.0 + RAISED_SHARE):
                 raised = here.cost / last - 1.0
-                return Rounds(here.estimate, here.cost, ended._replace(raised=raised), sums)
+                return self._outcome(here, ended._replace(raised=raised))
         raise AssertionError("the last round returns")
+
+    def _outcome(self, here: _Round, ended: Ended) -> Rounds:
+        """The end of the rounds, in the gauge that every method's cameras have."""
+        assert self._of_all is not None
+        estimate = here.estimate._replace(camera=in_gauge(here.estimate.camera, self._bases.narrowing.free))
+        return Rounds(estimate, here.cost, ended, self._of_all.linearise(estimate, self._loss))
 
     def _onward(self, before: Estimate, here: _Round, way: ndarray) -> tuple[Estimate, _Round]:
         """Where the next round starts, and that round: along the predicted way if that raises no cost."""

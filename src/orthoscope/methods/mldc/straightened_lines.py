@@ -27,7 +27,7 @@ from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss
 
-__all__ = ["OwnCamera", "StraightenedLines", "distances"]
+__all__ = ["OwnCamera", "StraightenedLines", "by_lens", "distances"]
 
 
 # A straight image that is smaller than this share of the photograph is no image of the lines any more.
@@ -51,7 +51,10 @@ class StraightenedLines:
         self.parameters = Parameters.of(free)
         self.free = self.parameters.names
         self._present = lines.present
-        self._detected = observations.pixels()[lines.row[:, None], lines.column]
+        seen = observations.present > 0
+        self._detected = observations.pixels()[seen]
+        number = np.cumsum(seen).reshape(seen.shape) - 1
+        self._corner = number[lines.row[:, None], lines.column]  # of each place of each line
 
     @property
     def measurements(self) -> int:
@@ -69,29 +72,22 @@ class StraightenedLines:
 
     def shrinks(self, unknowns: OwnCamera) -> bool:
         """Whether the lens makes next to nothing of the straight image."""
-        straight = unknowns.camera.undistort_pixels(self._detected[self._present])
-        return (
-            not np.ptp(straight, axis=0).max()
-            > SHRUNK_SHARE * np.ptp(self._detected[self._present], axis=0).max()
-        )
+        on_lines = self._detected[np.unique(self._corner[self._present])]
+        straight = unknowns.camera.undistort_pixels(on_lines)
+        return not np.ptp(straight, axis=0).max() > SHRUNK_SHARE * np.ptp(on_lines, axis=0).max()
 
     def linearise(self, unknowns: OwnCamera, loss: Loss) -> NormalEquations:
         """The solver's sums."""
         k, present = len(self.free), self._present
         camera, unit = unknowns.camera, float(max(unknowns.camera.image_size))
         with np.errstate(all="ignore"):
-            rays = camera.unproject(self._detected[present])
-            x = rays[:, :2] / np.where(rays[:, 2:] > 0, rays[:, 2:], np.nan)
-            image = camera.linearise((x[:, 0], x[:, 1], np.ones(len(x))), self.parameters)
-            (a, b, _), (c, d, _) = image.by_point
-            by_u, by_v = np.moveaxis(image.by_parameters(), 1, 0)
-            moved = -np.stack([d * by_u - b * by_v, a * by_v - c * by_u], axis=-1) / (a * d - b * c)[:, None]
-            points = np.zeros((*present.shape, 2))
-            slopes = np.zeros((k, *present.shape, 2))
-            points[present], slopes[:, present] = unit * x, unit * moved
-            across, slope = distances(points, present)
-            residual = across[present]
-            columns = np.einsum("lrwi,klwi->klr", slope, slopes)[:, present]
+            rays = camera.unproject(self._detected)
+            x = (rays[:, :2] / np.where(rays[:, 2:] > 0, rays[:, 2:], np.nan)).T
+            slopes = by_lens(camera, x, self.parameters)
+            places = np.concatenate([x[None], slopes])[:, :, self._corner] * (unit * present)
+            residual, columns = (
+                part[..., present] for part in distances_with(places[0], places[1:], present)
+            )
             squared = residual * residual
             cost = float(loss.cost(squared).sum())
             if (weight := loss.weight(squared)) is not None:
@@ -102,6 +98,39 @@ class StraightenedLines:
     def move(self, unknowns: OwnCamera, shared: Float[ndarray, " k"], views: ndarray) -> OwnCamera:
         """The unknown after a step."""
         return OwnCamera(self.parameters.moved(unknowns.camera, shared))
+
+
+def by_lens(camera: Camera, x: Float[ndarray, "2 n"], parameters: Parameters) -> Float[ndarray, "k 2 n"]:
+    """How straightened points move with parameters of the lens's own camera, where corners stay in the
+    photograph.
+
+    Args:
+        x: the points, in the plane at distance 1.
+    """
+    image = camera.linearise((*x, np.ones_like(x[0])), parameters)
+    (a, b, _), (c, d, _) = image.by_point
+    by_u, by_v = np.moveaxis(image.by_parameters(), 1, 0)
+    return -np.stack([d * by_u - b * by_v, a * by_v - c * by_u], axis=1) / (a * d - b * c)
+
+
+def distances_with(
+    points: Float[ndarray, "2 l w"], slopes: Float[ndarray, "k 2 l w"], present: ndarray
+) -> tuple[Float[ndarray, "l w"], Float[ndarray, "k l w"]]:
+    """Distances of points from the line nearest to them, as `distances`, and how they change with what moves
+    the points.
+
+    Args:
+        points: of each line.
+        slopes: of the points, by each parameter.
+        present: (l,w) which of them there are.
+    """
+    line = fitted_lines(np.moveaxis(points, 0, -1), present.astype(float))
+    (l_x, l_y), along, across = line.direction.T[:, :, None], line.along * present, line.across * present
+    onward = slopes[:, 0] * l_x + slopes[:, 1] * l_y
+    aside = slopes[:, 1] * l_x - slopes[:, 0] * l_y
+    turn = (across * onward + along * aside).sum(-1) / line.gap
+    own = aside - (aside.sum(-1) / present.sum(1))[..., None]
+    return across, own - along * turn[..., None]
 
 
 def distances(

@@ -63,11 +63,12 @@ class LineFormula(NamedTuple):
 ALIKE_FACTOR = 3.0
 # A centre less certain than this share of the diagonal is not known.
 VAGUE_CENTRE_SHARE = 0.03
-# From the stiffest on.
+# The first stands in where the edges do not tell a distortion centre. The others have a coefficient more than
+# edges often ask for: what a stiffer one gets wrong shows where there are few edges, at the frame's corners.
 FORMULAS = (
     LineFormula("division", False),
-    LineFormula("division", True),
     LineFormula("brown:k1,k2", True),
+    LineFormula("kannala_brandt:k1,k2", True),
 )
 
 
@@ -98,8 +99,7 @@ def lens_of_edges(edges: Sequence[Edge], image_size: tuple[int, int], *, lens: s
         edges: of all photographs.
         image_size: of each, (width, height) pixels.
         lens: a name of LENSES, or with the coefficients to free; radial ones, since it has a centre of its
-            own.
-            `auto` takes the simplest of FORMULAS that the edges do not refute.
+            own. `auto` takes that of FORMULAS which the edges speak for.
     Raises:
         CalibrationError: there are too few long edges, or too few agree on a lens.
         InputError: the lens is none.
@@ -127,7 +127,8 @@ def _best(
     _check_enough(int(used.sum()), "that one lens makes straight")
     chosen = [edge for edge, one in zip(edges, used, strict=True) if one]
     fits = [(formula, _fitted(chosen, image_size, formula)) for formula in formulas]
-    formula, straight = min(reversed(fits), key=lambda fit: _score(*fit, len(chosen)))
+    told = [fit for fit in fits if fit[0].centre and _tells_centre(fit[1])]
+    formula, straight = min(told or fits[:1], key=lambda fit: _score(fit[1], len(chosen)))
     return formula, straight, _bend(edges, straight.camera)
 
 
@@ -144,18 +145,16 @@ def _fitted(edges: Sequence[Edge], image_size: tuple[int, int], formula: LineFor
     )
 
 
-def _score(formula: LineFormula, straight: StraightLens, edges: int) -> float:
-    """Schwarz's criterion, two draws an edge (how bent, how skew), since errors along it are alike.
+def _tells_centre(straight: StraightLens) -> bool:
+    """Whether the edges tell the distortion centre, and not only guess it."""
+    at = [straight.free.index(name) for name in CENTRE if name in straight.free]
+    deviation = ALIKE_FACTOR * np.sqrt(np.diag(straight.covariance)[at].max(initial=0.0))
+    return bool(at) and bool(deviation <= VAGUE_CENTRE_SHARE * np.hypot(*straight.camera.image_size))
 
-    It is infinite where a free centre is a guess.
-    """
-    if formula.centre:
-        at = [straight.free.index(name) for name in CENTRE if name in straight.free]
-        deviation = ALIKE_FACTOR * np.sqrt(np.diag(straight.covariance)[at].max(initial=0.0))
-        if not at or deviation > VAGUE_CENTRE_SHARE * np.hypot(*straight.camera.image_size):
-            return np.inf
-    coefficients = [name for name in straight.free if name not in CENTRE]
-    return 2 * edges * float(np.log(straight.solution.cost)) + len(coefficients) * float(np.log(2 * edges))
+
+def _score(straight: StraightLens, edges: int) -> float:
+    """Schwarz's criterion, two draws an edge (how bent, how skew), since errors along it are alike."""
+    return 2 * edges * float(np.log(straight.solution.cost)) + len(straight.free) * float(np.log(2 * edges))
 
 
 def _long(edges: Sequence[Edge], image_size: tuple[int, int]) -> list[Edge]:

@@ -102,10 +102,11 @@ def centre_of_distortion(views: Sequence[GridView], image_size: tuple[int, int])
             axis=-1,
         )
         step = -np.linalg.lstsq(slopes, off, rcond=None)[0]
-        share = 1.0
-        while share > 1e-3 and (after := _off(views, centre + share * step)) @ after > off @ off:
+        share, after = 1.0, _off(views, centre + step)
+        while share > 1e-3 and after @ after > off @ off:
             share *= 0.5
-        centre, off = centre + share * step, _off(views, centre + share * step)
+            after = _off(views, centre + share * step)
+        centre, off = centre + share * step, after
         if np.hypot(*(share * step)) < SETTLED_PX:
             break
     if not _within(centre, image_size, reach):
@@ -123,12 +124,17 @@ def radial_view(view: GridView, centre: Float[ndarray, "2"]) -> RadialView:
     outwards = np.column_stack([x, y])
     for _ in range(WEIGHINGS):
         weight = 1.0 / np.maximum(np.hypot(*outwards.T), 1e-12)
-        of_x, of_y = np.linalg.svd(rows * weight[:, None], full_matrices=False)[2][-1].reshape(2, 3)
+        of_x, of_y = _least_row(rows * weight[:, None]).reshape(2, 3)
         outwards = np.column_stack([view.places @ of_x, view.places @ of_y])
     if (outwards[:, 0] * x + outwards[:, 1] * y).sum() < 0:
         outwards = -outwards
     length = np.maximum(np.hypot(*outwards.T), 1e-12)
     return RadialView(outwards, (x * outwards[:, 1] - y * outwards[:, 0]) / length)
+
+
+def _least_row(rows: Float[ndarray, "n k"]) -> Float[ndarray, " k"]:
+    """The unit vector that many rows come nearest to leaving at nothing, by their triangle alone."""
+    return np.linalg.svd(np.linalg.qr(rows, mode="r"))[2][-1]
 
 
 def _off(views: Sequence[GridView], centre: Float[ndarray, "2"]) -> Float[ndarray, " n"]:
@@ -143,7 +149,7 @@ def _linear_centre(views: Sequence[GridView], image_size: tuple[int, int]) -> Fl
     for view in views:
         p = np.column_stack([(view.pixels - middle) / unit, np.ones(len(view.pixels))])
         rows = (p[:, :, None] * view.places[:, None, :]).reshape(len(p), 9)
-        matrices.append(np.linalg.svd(rows, full_matrices=False)[2][-1].reshape(3, 3))
+        matrices.append(_least_row(rows).reshape(3, 3))
     e = np.linalg.svd(np.concatenate(matrices, axis=1))[0][:, -1]
     return middle + unit * e[:2] / e[2] if abs(e[2]) > 1e-9 else middle
 

@@ -6,6 +6,7 @@ pixels; a band spans all directions around the axis.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,7 @@ def curve(evaluation: Evaluation) -> dict[str, Any] | str:
 
 def angles_shown(camera: Camera, count: int) -> Float[ndarray, " a"]:
     """From the axis to a little beyond the frame's corners, radians; empty where no pixel has a ray."""
-    edge = _largest_angle(camera.unproject(_outline(camera)))
+    edge = _edge(camera)
     if not np.isfinite(edge):
         return np.empty(0)
     return np.linspace(0.0, min(BEYOND_RATIO * edge, camera.lens.chart.reach - 1e-3), count)
@@ -82,8 +83,7 @@ def marks(calibration: Calibration) -> list[tuple[str, float, str]]:
     camera = calibration.camera
     pixels = [view.pixels for view in calibration.detections.views if len(view.pixels)]
     seen = _largest_angle(camera.unproject(np.concatenate(pixels))) if pixels else float("nan")
-    edge = _largest_angle(camera.unproject(_outline(camera)))
-    whole = bool(np.isfinite(camera.unproject(image_border(camera.image_size))).all())
+    edge, whole = _edge(camera), bool(np.isfinite(_border(camera)).all())
     return [
         ("seen", seen, "farthest corner seen"),
         ("edge", edge, "image corner" if whole else "last pixel with a ray"),
@@ -99,15 +99,24 @@ def _band(values: Float[ndarray, "a d"]) -> dict[str, list]:
     }
 
 
-def _outline(camera: Camera) -> Float[ndarray, "n 2"]:
-    """Pixels of the frame's border and of a coarse grid inside, which still has rays where an image circle
-    lies within the frame.
+@lru_cache(maxsize=1)
+def _border(camera: Camera) -> Float[ndarray, "n 3"]:
+    """Rays of the frame's border."""
+    return camera.unproject(image_border(camera.image_size))
+
+
+def _edge(camera: Camera) -> float:
+    """The largest angle from the axis in the frame: on its border where that has rays all around, else there
+    and on a coarse grid inside, which still has rays where an image circle lies within the frame.
     """
+    border = _border(camera)
+    if np.isfinite(border).all():
+        return _largest_angle(border)
     width, height = camera.image_size
     inside = np.stack(
         np.meshgrid(np.linspace(0, width - 1, 65), np.linspace(0, height - 1, 65)), axis=-1
     ).reshape(-1, 2)
-    return np.concatenate([image_border(camera.image_size), inside])
+    return _largest_angle(np.concatenate([border, camera.unproject(inside)]))
 
 
 def _largest_angle(rays: Float[ndarray, "n 3"]) -> float:

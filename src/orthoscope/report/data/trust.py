@@ -14,7 +14,7 @@ __all__ = ["trust", "without_each"]
 
 def trust(evaluation: Evaluation) -> dict[str, Any] | str:
     """The map at infinity and at the target's distance, thousandths of a pixel at the centres of cells, and
-    the region as a polygon, tenths of a pixel.
+    the region as a polygon, tenths of a pixel, with the share of the frame that lies in it.
     """
     error = evaluation.error
     if error is None:
@@ -28,6 +28,7 @@ def trust(evaluation: Evaluation) -> dict[str, Any] | str:
         "limit": float(f"{error.limit_px:.3g}"),
         "distance": float(f"{error.distance:.3g}"),
         "region": whole(error.region.ravel(), PLACE_UNITS),
+        "share": round(error.share, 4) if np.isfinite(error.share) else None,  # files of before had none
     }
 
 

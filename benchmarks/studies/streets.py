@@ -11,6 +11,9 @@ import numpy as np
 from numpy import ndarray
 
 from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.lens import Lens
+
+__all__ = ["street_camera", "street_photograph"]
 
 OVERSAMPLING = 3
 
@@ -35,10 +38,12 @@ def street_photograph(camera: Camera, *, rng: np.random.Generator, noise: float 
     return np.clip(seen + rng.normal(0, noise, seen.shape), 0, 255).astype(np.uint8)
 
 
-def street_camera(lens, centre: tuple[float, float] = (330.0, 232.0)) -> Camera:
+def street_camera(
+    lens: Lens, *, centre: tuple[float, float] = (330.0, 232.0), focal: float = 520.0
+) -> Camera:
     """A camera of 640 x 480 pixels with the lens about a centre of its own."""
-    K = Intrinsics(520.0, 520.0, 320.0, 240.0)
-    return Camera((640, 480), K, lens, lens_frame=Intrinsics(520.0, 520.0, *centre))
+    K = Intrinsics(focal, focal, 320.0, 240.0)
+    return Camera((640, 480), K, lens, lens_frame=Intrinsics(focal, focal, *centre))
 
 
 def _street(size: ndarray, rng: np.random.Generator) -> ndarray:
