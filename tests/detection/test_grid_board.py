@@ -78,3 +78,17 @@ def test_markers_white_on_black_and_a_films_negative_have_the_ids_of_the_positiv
     assert isinstance(negative, Sight)
     assert len(negative.ids) >= 0.95 * len(positive.ids)
     assert np.linalg.norm(negative.pixels - truth[negative.ids], axis=1).max() < 0.5
+
+
+def test_a_cameras_curve_and_a_covered_corner_move_no_corner():
+    picture, truth = photographed(BOARD, 2)
+    curved = (255 * (picture / 255.0) ** 0.45).astype(np.uint8)  # all that is black is smaller
+    sight = see(curved, target_of(BOARD))
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) > 0.9 * len(truth)
+    assert np.linalg.norm(sight.pixels - truth[sight.ids], axis=1).max() < 0.3
+    x, y = np.rint(truth[20]).astype(int)
+    picture[y - 5 : y + 6, x - 5 : x + 6] = 120
+    covered = see(picture, target_of(BOARD))
+    assert isinstance(covered, Sight)
+    assert np.linalg.norm(covered.pixels - truth[covered.ids], axis=1).max() < 0.5

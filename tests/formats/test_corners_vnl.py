@@ -144,6 +144,18 @@ def test_a_name_that_the_table_cannot_hold_is_refused(tmp_path, name):
     assert not (tmp_path / "corners.vnl").exists()
 
 
+def test_corners_whose_x_and_y_are_swapped_are_a_mirror_image_and_that_is_said(tmp_path):
+    right = [(100 + 50 * column + 5 * row, 200 + 60 * row) for row in range(2) for column in range(3)]
+    for swapped in (False, True):
+        rows = [f"a.jpg {y if swapped else x} {x if swapped else y} 0" for x, y in right]
+        found = read(tmp_path, "\n".join(["# filename x y level", *rows]) + "\n", size=(640, 640))
+        assert len(found.remarks) == swapped
+    (remark,) = found.remarks
+    assert remark.image == "a.jpg"
+    assert "a mirror image of chessboard:3x2:100mm" in remark.words
+    assert "x and y are not swapped" in remark.words
+
+
 FAULTS = {
     "a legend with more columns than its rows have": (
         "# filename a b x y level\na.jpg 1 2 0\n",

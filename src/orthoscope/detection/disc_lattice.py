@@ -33,6 +33,8 @@ MOST_ANGLE = 0.35
 DIRECTION_STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
 # At most this share of the discs found has no place on the board.
 MOST_MISSING_SHARE = 0.12
+# Where the discs found reach over the whole board, at most this share has no place: something covers them.
+MOST_COVERED_SHARE = 0.5
 # Another way to lay the board is as good when it misses no more than this share of a shorter side's discs.
 RIVAL_SHARE = 0.5
 # At most so many spots join the lattice by chance.
@@ -49,8 +51,10 @@ MOST_ROUGH, SMOOTH_RADII = 3.0, 0.03
 # A disc's radius is at most this share off what those near it foresee, or so many times the usual share.
 MOST_OFF_SIZE, TIMES_OFF_SIZE = 0.1, 5.0
 # A disc's centre is at most so many of its radii off from where those near it foresee it, or so many times as
-# far as is usual.
-MOST_OFF_PLACE, TIMES_OFF_PLACE = 0.15, 6.0
+# far as is usual; one that is rough or of another size then not more than so many pixels.
+MOST_OFF_PLACE, TIMES_OFF_PLACE, MOST_OFF_PX = 0.15, 6.0, 0.8
+# A disc whose outline is rougher than this, radii, or its radius off by more than this share, may be covered.
+SURELY_SMOOTH, SURELY_AS_LARGE = 0.015, 0.03
 
 
 def numbered(discs: Ellipses) -> tuple[Int[ndarray, " n"], Int[ndarray, "n 2"]]:
@@ -146,12 +150,24 @@ def laid_on(
                 if (ids < 0).sum() <= MOST_SPOTS_OFF_BOARD and (ids >= 0).sum() >= 4:
                     ways.append(ids)
     missing = np.array([_missing(board, discs, ids, shape) for ids in ways])
-    if not len(ways) or missing.min() > MOST_MISSING_SHARE * len(places):
+    if not len(ways):
+        return np.full(len(places), -1), False
+    allowed = MOST_COVERED_SHARE if _reaches_over(board, ways[int(missing.argmin())]) else MOST_MISSING_SHARE
+    if missing.min() > allowed * len(places):
         return np.full(len(places), -1), False
     off = np.array([(ids < 0).sum() for ids in ways])
     most = missing.min() + RIVAL_SHARE * min(board.columns, board.rows)
     good = [ways[i] for i in np.flatnonzero((missing <= most) & (off <= off[missing.argmin()]))]
     return _of_same(board, discs, good)
+
+
+def _reaches_over(board: Circles, ids: Int[ndarray, " n"]) -> bool:
+    """Whether discs are seen of the board's first and last row and column, and of it at least half: it can
+    then lie in one way only, whatever a hand covers of it.
+    """
+    row, column = np.divmod(ids[ids >= 0], board.columns)
+    ends = row.min() == 0, row.max() == board.rows - 1, column.min() == 0, column.max() == board.columns - 1
+    return all(ends) and (ids >= 0).all() and 2 * len(ids) >= board.columns * board.rows
 
 
 def _of_same(board: Circles, discs: Ellipses, ways: list[ndarray]) -> tuple[Int[ndarray, " n"], bool]:
@@ -225,7 +241,10 @@ def like_the_others(
             told, reach = weights @ known[nearest], max(1.0, float(np.linalg.norm(weights)))
             off_place[number] = np.hypot(*(told - known[number])[:2]) / radii[number] / reach
             off_size[number] = abs(told[2] - known[number, 2]) / reach
-    good &= off_place < max(MOST_OFF_PLACE, TIMES_OFF_PLACE * median(off_place))
+    usual = np.full(len(ids), TIMES_OFF_PLACE * median(off_place))
+    suspect = (roughness > SURELY_SMOOTH) | (off_size > SURELY_AS_LARGE)
+    usual[suspect] = np.minimum(usual, MOST_OFF_PX / radii)[suspect]
+    good &= off_place < np.maximum(MOST_OFF_PLACE, usual)
     return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
 
 

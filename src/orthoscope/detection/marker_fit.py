@@ -8,8 +8,9 @@ picture is
     I(x) = c + g.x + b M(x),      M(x) = blurred P(H^-1(x + d(x))),    d a polynomial of third order
 
 d moves, stretches and bends: a lens bends the marker. Gauss-Newton on d's twenty numbers and the blur (what
-blur does is the Laplacian of M), with b, c and g beside them. What noise alone would bend is held back as far
-as lenses hardly bend so much. The corner is where x + d(x) is H's corner.
+blur does is the Laplacian of M), with b, c and g beside them, and with |grad M|: ink that bled, a camera's
+curve and white that is clipped make all that is black larger or smaller. What noise alone would bend is held
+back as far as lenses hardly bend so much. The corner is where x + d(x) is H's corner.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ import numpy as np
 
 from orthoscope.detection.markers import homography_of
 from orthoscope.detection.noise import noise_variance
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, median, ndarray
 
 __all__ = ["FittedMarkers", "fit_markers"]
 
 # Squares of a marker that are larger than this, pixels, are reduced to about it.
 USUAL_MODULE = 4.5
 # A marker's drawing has at most so many pixels along each of its squares; no more than samples are taken.
-MOST_DRAWN = 8
+MOST_DRAWN = 16
 # And so many white squares around it.
 DRAWN_MARGIN = 2
 # The picture around a marker is compared as far as this share of the gap to the next, and a square at most.
@@ -39,7 +40,7 @@ SAMPLES_PER_MODULE = 6.0
 # So many samples along a pixel are the most.
 MOST_SAMPLES = 4
 # The blur from which all begin, and the least and most, pixels.
-FIRST_BLUR, LEAST_BLUR, MOST_BLUR = 0.8, 0.3, 6.0
+FIRST_BLUR, LEAST_BLUR, MOST_BLUR = 0.8, 0.1, 6.0
 # A marker has at most so many steps, and has arrived when its corners move by less than this, pixels.
 MOST_STEPS, STILL_PX = 8, 0.05
 # When they have moved by more than this, pixels, they take the place of those from which it began.
@@ -59,8 +60,14 @@ POWERS = np.array([(i - j, j) for i in range(4) for j in range(i + 1)])
 STRAIGHT = 3
 # Light changes over half a marker by about this share of the contrast.
 USUAL_LIGHT = 0.1
+# Edges are all moved outwards by more than about this, pixels, only where the picture says so in spite of its
+# noise.
+USUAL_SHIFT = 0.015
 # At most this share of the picture's variance is neither noise nor explained, or something else is there.
 MOST_UNEXPLAINED = 0.03
+# What is usually left, by a coarse compression as by noise, counts as noise where so many markers say it, up
+# to this share of the square of the contrast.
+ENOUGH_TO_COMPARE, MOST_USUAL_SHARE = 4, 0.004
 # Within so many squares from a good corner what is left has a variance, but for noise, of at most this share
 # of the square of the contrast.
 LOCAL_MODULES, MOST_LOCALLY_UNEXPLAINED = 1.5, 0.0015
@@ -91,18 +98,25 @@ def fit_markers(
     modules = np.array([len(drawing) for drawing in drawings])
     shrinks = np.maximum(np.rint(sides.min(1, initial=np.inf) / modules / USUAL_MODULE), 1).astype(int)
     noise = noise_variance(grey)
+    fits: dict[int, _Fit] = {}
     for shrink in np.unique(shrinks):
         height, width = (side // shrink for side in grey.shape)
         part = grey[: height * shrink, : width * shrink]
         small = cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA) if shrink > 1 else grey
         blur = FIRST_BLUR
-        for number in np.flatnonzero(shrinks == shrink):
+        for number in np.flatnonzero(shrinks == shrink).tolist():
             start = (corners[number] + 0.5) / shrink - 0.5
             fit = _Fit(small, start, drawings[number], GAP_SHARE * min(gap, 1.0 / GAP_SHARE), blur)
             if fit.settle():
-                fine[number] = (fit.corners + 0.5) * shrink - 0.5
-                good[number] = fit.like(noise / shrink**2) & (fit.spread() * shrink < WIDEST_SPREAD)
-                blur = fit.blur
+                fits[number], blur = fit, fit.blur
+    usual = median(np.array([fit.noise for fit in fits.values()])) if len(fits) >= ENOUGH_TO_COMPARE else 0.0
+    for number, fit in fits.items():
+        shrink, signal = shrinks[number], fit.contrast**2
+        fine[number] = (fit.corners + 0.5) * shrink - 0.5
+        noise_here = max(noise / shrink**2, min(usual, MOST_USUAL_SHARE * signal)) / signal
+        good[number] = fit.left_near_corners() < MOST_LOCALLY_UNEXPLAINED + noise_here
+        good[number] &= fit.spread() * shrink < WIDEST_SPREAD
+        good[number] &= fit.unexplained < MOST_UNEXPLAINED + noise_here / (0.25 + noise_here)
     return FittedMarkers(fine, good)
 
 
@@ -161,25 +175,24 @@ class _Fit:
                 self.start, self._moved = self.corners, np.zeros_like(self._moved)
         return True
 
-    def like(self, noise: float) -> Bool[ndarray, "4"]:
-        """At which corners the drawing explains the picture but for noise of this variance, as it does all of
-        it.
-        """
-        signal = 0.25 * self.contrast**2
-        if self.unexplained > MOST_UNEXPLAINED + noise / (signal + noise):
-            return np.zeros(4, dtype=bool)
+    def left_near_corners(self) -> Float[ndarray, "4"]:
+        """The variance that the drawing leaves near each corner, as a share of the square of the contrast."""
         near = LOCAL_MODULES * self._side / self._squares
         away = np.linalg.norm(self._places - (self.corners - self._low)[:, :, None], axis=1)
         left = np.array([self._left[row < near].var() if (row < near).any() else np.inf for row in away])
-        return left < MOST_LOCALLY_UNEXPLAINED * self.contrast**2 + noise
+        return left / self.contrast**2
 
     def _step(self) -> bool:
         """One step of Gauss-Newton; whether it could be made."""
         model, count = self._drawn(), len(POWERS)
-        columns = np.empty((2 * count + 5, len(self._values)), np.float32)
-        for first, way in ((0, (1, 0)), (count, (0, 1))):
-            slope = cv2.Scharr(model, cv2.CV_32F, *way, scale=1.0 / 32.0)
-            np.multiply(slope.take(self._inside), self._basis_inside, out=columns[first : first + count])
+        columns = np.empty((2 * count + 6, len(self._values)), np.float32)
+        slopes = [
+            cv2.Scharr(model, cv2.CV_32F, *way, scale=1.0 / 32.0).take(self._inside)
+            for way in ((1, 0), (0, 1))
+        ]
+        for first, slope in zip((0, count), slopes, strict=True):
+            np.multiply(slope, self._basis_inside, out=columns[first : first + count])
+        columns[-6] = np.hypot(*slopes)
         columns[-5] = cv2.Laplacian(model, cv2.CV_32F, ksize=1).take(self._inside)
         columns[-2], columns[-1] = model.take(self._inside), 1.0
         np.multiply(self._basis_inside[1:3], columns[-2] + np.float32(self._dark), out=columns[-4:-2])
@@ -187,6 +200,7 @@ class _Fit:
         # what the bend was before counts, too: as a whole it is held to nothing, by as much as there is noise
         held = 1e-7 * np.diag(normal) + 1e-9
         held[: 2 * count] += self.noise / np.maximum(self._usual_bends * abs(self.contrast), 1e-6) ** 2
+        held[-6] += self.noise / max(USUAL_SHIFT * abs(self.contrast), 1e-6) ** 2
         held[-4:-2] += self.noise / max(USUAL_LIGHT * abs(self.contrast), 1e-6) ** 2
         wanted = np.zeros(len(held))
         wanted[: 2 * count] = np.where(

@@ -43,7 +43,7 @@ SADDLE_MEAN_SQUARE = 0.6
 FARTHEST_SHARE = 0.35
 # Of a sure corner the standard deviation is less than this, pixels: it is within a pixel then, as good as
 # always.
-WIDEST_SPREAD = 0.22
+WIDEST_SPREAD = 0.19
 # The edges of a sure corner are off the lattice's lines by less than this, radians.
 WIDEST_TURN = 0.4
 # A sure corner has more than this share of the usual contrast.
@@ -51,6 +51,8 @@ LEAST_CONTRAST_SHARE = 0.35
 # Of a sure corner's window the saddle leaves at most so much more than of most, as a share of its variance
 # and, with that, of the share that is noise.
 MOST_UNEXPLAINED, MOST_UNEXPLAINED_NOISE = 0.03, 0.3
+# Where a marker reaches into the window, whose blur is in it, so much more.
+MOST_UNEXPLAINED_BY_MARKS = 0.1
 # A mark on one side of a sure corner is farther from its edges than so many of the fitted blurs.
 CLEAR_BLURS = 2.0
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
@@ -105,7 +107,7 @@ def refined(
         _window(shape.along),
         _window(shape.down),
         bends=np.stack([shape.bend_along, shape.bend_down], axis=1),
-        arms=_arms(shape, arm),
+        arms=(arms := _arms(shape, arm)),
     )
     allowed = np.maximum(FARTHEST_SHARE * step, 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
@@ -118,17 +120,20 @@ def refined(
     sure &= _are_clear(saddles, step, arm)
     if not (sure & (_turn(saddles, shape) < WIDEST_TURN)).all():  # what is off was perhaps not near yet
         shape = grid_shape(saddles.places, places)
-    sure &= _are_alike(saddles, shape, noise_share)
+    most_left = np.where(arms < 1.0, MOST_UNEXPLAINED_BY_MARKS, MOST_UNEXPLAINED)
+    sure &= _are_alike(saddles, shape, noise_share, most_left)
     return Refined(pixels, believed, saddles.explained, sure)
 
 
-def _are_alike(saddles: Saddles, shape: GridShape, noise_share: Float[ndarray, " m"]) -> Bool[ndarray, " m"]:
+def _are_alike(
+    saddles: Saddles, shape: GridShape, noise_share: Float[ndarray, " m"], most_left: Float[ndarray, " m"]
+) -> Bool[ndarray, " m"]:
     """Which saddles have edges along the lattice's lines, about as much contrast as most, and are as true to
     the picture as most: where something covers a part of a window, it is explained less.
     """
     contrast = np.abs(saddles.contrast)
     left = 1.0 - saddles.explained - noise_share
-    true = left - median(left) < MOST_UNEXPLAINED + MOST_UNEXPLAINED_NOISE * noise_share
+    true = left - median(left) < most_left + MOST_UNEXPLAINED_NOISE * noise_share
     return true & (_turn(saddles, shape) < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * median(contrast))
 
 

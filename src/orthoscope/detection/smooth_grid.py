@@ -48,6 +48,7 @@ def off_smooth_grid(
     *,
     doubtful: Bool[ndarray, " m"],
     poor: bool,
+    most_order: int = ORDERS[0][0],
 ) -> tuple[Bool[ndarray, " m"], Float[ndarray, "m 2"], float]:
     """Which corners are off, where the others foresee every one, and how far from there is off, pixels.
 
@@ -57,9 +58,10 @@ def off_smooth_grid(
         step: from a corner to the next, pixels.
         doubtful: which are off sooner, by half of that.
         poor: whether the picture's noise, not lens or board, makes the residuals.
+        most_order: of the polynomial; of corners that are mistaken four together a higher one follows them.
     """
     none = np.zeros(len(pixels), dtype=bool), pixels.copy(), np.inf
-    reach = min(np.ptp(places, axis=0)) - 1
+    reach = min(np.ptp(places, axis=0).min() - 1, most_order)
     orders = ORDERS_OF_POOR if poor else ORDERS
     order = next((order for order, needed in orders if len(pixels) >= needed and reach >= order), None)
     if order is None:

@@ -6,9 +6,12 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+import cv2
+import numpy as np
+
 from orthoscope.detection.chessboard import board_size, lattice_sizes
 from orthoscope.detection.recognition.disc_layout import disc_boards
-from orthoscope.detection.recognition.marker_layout import marker_boards
+from orthoscope.detection.recognition.marker_layout import marker_alone, marker_boards
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
 from orthoscope.files.images import MOST_MEGAPIXELS
@@ -25,6 +28,16 @@ __all__ = ["Recognised", "recognise"]
 LOOKED_AT = 8
 # Lattices of one size in fewer photographs agree by chance.
 ENOUGH_TO_AGREE = 3
+# Marks of a chessboard are looked for in so many photographs.
+LOOKED_AT_FOR_MARKS = 3
+# A square that may have a marker is looked at as a picture of so many pixels to a side.
+PATCH = 160
+# So many corners around it say where it is.
+CORNERS_AROUND = 12
+# A marked chessboard has at least so many corners either way.
+FEWEST_OF_MARKED = 4
+# A marked chessboard is described with it until its marker is read.
+ANY_DICTIONARY = "DICT_4X4_50"
 # A square of a chessboard, as it is described, metres.
 NOMINAL = 0.025
 
@@ -69,6 +82,8 @@ def recognise(photographs: Given, *, most_megapixels: float = MOST_MEGAPIXELS) -
         found = len(sights), sum(len(sight.ids) for sight in sights), target
         if sights and (best is None or found[:2] > best[:2]):
             best = found
+        if sights and len(sights) > 0.5 * len(greys) and board.kind != MarkedChessboard.kind:
+            break
     if best is None:
         raise CalibrationError(
             f"none of {len(greys)} photographs shows a chessboard whose four sides are seen, markers in a"
@@ -99,12 +114,45 @@ def _candidates(greys: Sequence[ndarray]) -> Iterator[Board]:
         yield from marker_boards(greys)
     sizes = [size for size, _ in whole.most_common(2)] or _again_and_again(greys) or [_at_least(greys)]
     for columns, rows in sizes:
-        if min(columns, rows) >= 4:
-            yield MarkedChessboard(columns, rows, NOMINAL)
-            yield MarkedChessboard(rows, columns, NOMINAL)
+        yield from _marked(greys, columns, rows)
         if min(columns, rows) >= 3:
             yield Chessboard(columns, rows, NOMINAL)
     yield from disc_boards(greys)
+
+
+def _marked(greys: Sequence[ndarray], columns: int, rows: int) -> Iterator[Board]:
+    """The marked chessboards of these counts that the first photographs of a board may show."""
+    if min(columns, rows) < FEWEST_OF_MARKED:
+        return
+    few = greys[:LOOKED_AT_FOR_MARKS]
+    for counts in dict.fromkeys([(columns, rows), (rows, columns)]):
+        board = MarkedChessboard(*counts, NOMINAL)
+        if any(isinstance(see(grey, target_of(board)), Sight) for grey in few):
+            yield board
+    around_one = MarkedChessboard(columns, rows, NOMINAL, (), ANY_DICTIONARY, 0.5 * NOMINAL)
+    for grey in few:
+        sight = see(grey, target_of(Chessboard(columns, rows, NOMINAL)))
+        for patch in _middle_squares(grey, sight, around_one) if isinstance(sight, Sight) else ():
+            if (found := marker_alone(patch)) is not None:
+                name, number, marker = found
+                side = float(np.linalg.norm(np.roll(marker, 1, axis=0) - marker, axis=1).mean()) / PATCH
+                yield MarkedChessboard(columns, rows, NOMINAL, (), name, round(side * NOMINAL, 4), number)
+                return
+
+
+def _middle_squares(grey: ndarray, sight: Sight, board: MarkedChessboard) -> Iterator[ndarray]:
+    """The square of a board that may have a marker, straightened, for either end first."""
+    corners = board.corners_of(board.marker_square)
+    for ids in (sight.ids, board.columns * board.rows - 1 - sight.ids):
+        places = board.places()
+        apart = np.linalg.norm(places[ids] - places[corners].mean(0), axis=1)
+        near = np.argsort(apart, kind="stable")[:CORNERS_AROUND]
+        if len(near) < CORNERS_AROUND:
+            continue
+        onto = PATCH * (places[ids[near]] - places[corners[0]])
+        straight, _ = cv2.findHomography(sight.pixels[near], onto, 0)
+        if straight is not None:
+            yield cv2.warpPerspective(grey, straight, (PATCH, PATCH))
 
 
 def _again_and_again(greys: Sequence[ndarray]) -> list[tuple[int, int]]:

@@ -133,7 +133,11 @@ CAUSES: tuple[Cause, ...] = (
         "few",
         lambda s: s.views < FEWEST_PHOTOGRAPHS or (isnan(s.error_px) and s.distinct < FEW_VIEWS),
         lambda s: Grade.NO if s.views < 2 or isnan(s.error_px) else Grade.USABLE,
-        lambda s: f"{_photograph(s.views)} cannot tell how far off it is",
+        lambda s: (
+            f"{_photograph(s.views)} cannot tell how far off it is"
+            if isnan(s.error_px)
+            else f"{_photograph(s.views)} are too few to rely on that"
+        ),
     ),
     Cause(
         "unknown",

@@ -1,0 +1,29 @@
+"""Rendered photographs of every kind of target, good and poor ones: no corner is where none is."""
+
+from __future__ import annotations
+
+import pytest
+from benchmarks.studies.false_corners import FALSE_PX, errors_of, photographs
+
+from orthoscope.detection.sight import Sight
+from orthoscope.detection.table import see
+
+
+@pytest.mark.slow  # rare faults need many photographs
+def test_no_corner_is_a_pixel_from_where_its_id_is():
+    count, found = 120, 0
+    for shown in photographs(count, seed=20):
+        sight = see(shown.picture, shown.target)
+        if isinstance(sight, Sight):
+            found += 1
+            assert errors_of(shown, sight).max() < FALSE_PX, (shown.number, shown.target.name, shown.told)
+    assert found > 0.6 * count  # poor photographs of small markers show nothing
+
+
+def test_a_hidden_corner_is_not_leapt_over():
+    """A steep board whose marker hides corners of its square was numbered as if they were not there."""
+    (shown,) = photographs(1, first=112)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) >= len(shown.truth) - 4  # those beside the marker are not sure
+    assert errors_of(shown, sight).max() < 0.1
