@@ -139,14 +139,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--board", nargs="*", default=["x".join(map(str, board)) for board in BOARDS])
     asked = parser.parse_args(arguments)
     far, *near = ("far away" if np.isinf(distance) else f"{distance:g} m" for distance in DISTANCES)
-    columns = ("model", "board", "views", "parameters", f"middle, edge, corner {far}", *near)
-    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
-    boards = [tuple(map(int, board.split("x"))) for board in asked.board]
-    for base, (name, model), board, views in product(CAMERAS, MODELS.items(), boards, asked.views):
+    heads = ("model", "board", "views", "parameters", f"middle, edge, corner {far}", *near)
+    print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
+    for base, name in product(CAMERAS, MODELS):
         if asked.only not in f"{base}, {name}":
             continue
-        found = study(base, model, board, views, asked.draws)
-        print(f"| {base}, {name} | {board[0]}x{board[1]} | {views} | {found} |", flush=True)
+        for board in asked.board:
+            columns, rows = (int(count) for count in board.split("x"))
+            for views in asked.views:
+                found = study(base, MODELS[name], (columns, rows), views, asked.draws)
+                print(f"| {base}, {name} | {board} | {views} | {found} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -39,10 +39,11 @@ def size_for(tool: str) -> dict:
 
 @pytest.mark.parametrize(("tool", "i", "suffix"), HELD)
 def test_a_camera_that_a_tool_can_hold_is_written_and_read_as_itself(tmp_path, tool, i, suffix):
-    camera = camera_held(FORMATS[tool], FORMATS[tool].holdings[i])
+    holding = FORMATS[tool].holdings[i]
+    camera = camera_held(FORMATS[tool], holding)
     exported = export(camera, tmp_path / f"cameras{suffix}", tool)
     assert exported.held.camera is camera
-    assert exported.remarks() == ()
+    assert len(exported.remarks()) == bool(holding.note)  # nothing is lost, at most something to know
     again = load_camera(tmp_path / f"cameras{suffix}", **size_for(tool))
     assert again.image_size == SIZE
     assert farthest_apart(camera, again) < 1e-9  # px: a shift of the origin rounds, and lensfun's units do
@@ -184,7 +185,7 @@ def test_of_a_wide_lens_the_share_that_the_tool_cannot_show_is_said(tmp_path):
     told = export(wide, tmp_path / "camera.yaml", "opencv").remarks()
     rays = wide.unproject(np.stack(np.meshgrid(np.arange(640.0), np.arange(480.0)), axis=-1).reshape(-1, 2))
     share = (rays[:, 2] < 0).mean()
-    found = re.match(r"([\d.]+) % of the frame looks farther than 90 degrees", told[0])
+    found = re.match(r"([\d.]+) % of the frame looks farther than 90 degrees", told[-1])
     assert found
     assert float(found[1]) == pytest.approx(100 * share, rel=0.02)
     assert export(wide, tmp_path / "calib.json", "basalt").remarks() == ()

@@ -12,6 +12,9 @@ from orthoscope.cli.telling import tell, tell_json
 
 __all__ = ["calibrate", "calibrate_into"]
 
+# What is written into the folder where it is asked for.
+ON_REQUEST = ("report.html", "camera-*", "corrected.*")
+
 EXAMPLE = """\b
 Example:
   $ orthoscope calibrate photos/ --target chessboard:9x6:25mm -o camera/
@@ -67,11 +70,11 @@ Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong,
 )
 @click.option(
     "--export",
+    multiple=True,
     type=options.TOOL,
     help=(
-        "Also write the camera for a tool (`orthoscope tools` lists them), into OUT/camera-TOOL; --lens auto"
-        " then"
-        " takes a lens that the tool has."
+        "Also write the camera for a tool (`orthoscope tools` lists them), into OUT/camera-TOOL; once for each"
+        " tool. --lens auto then takes a lens that the first of them has."
     ),
 )
 @click.option("--undistort", is_flag=True, help="Also write straight pictures, into OUT/undistorted.")
@@ -112,7 +115,7 @@ def calibrate_into(
     more: tuple[str, ...] = (),
     jobs: int | None = None,
     cluster: str | None = None,
-    export: str | None = None,
+    export: tuple[str, ...] = (),
     undistort: bool = False,
     keep: str = "all",
     corrected: bool = False,
@@ -139,7 +142,7 @@ def calibrate_into(
         from orthoscope.targets.left_out import left_out
 
     check_folder(out)
-    lenses = _lenses_of(export)
+    lenses = _lenses_of(export[0]) if export else ()
     formulas = lenses if "formulas" in settings_of(method) else ()
     given = {
         "lens": lens,
@@ -171,7 +174,7 @@ def calibrate_into(
     if corrected:
         written += _write_corrected(calibration, out)
     if export:
-        written += _write_for(export, calibration, out)
+        written += [path for tool in dict.fromkeys(export) for path in _write_for(tool, calibration, out)]
     if report:
         written.append(_write_report(evaluation, files, out, keep=keep, jobs=jobs))
     if undistort:
@@ -180,8 +183,17 @@ def calibrate_into(
         tell_json(text_of(evaluation))
     else:
         tell(*evaluation_lines(evaluation, verbose=verbose), "wrote      " + ", ".join(map(str, written)))
+    _tell_of_others(out, written)
     leave_unless_usable(evaluation.verdict.grade, strict=strict)
     return evaluation
+
+
+def _tell_of_others(out: Path, written: list[Path]) -> None:
+    """Say what earlier calibrations wrote into the folder that this one did not write anew."""
+    from orthoscope.cli.undistort import tell_of_earlier
+
+    there = [path for pattern in ON_REQUEST for path in sorted(out.glob(pattern)) if path.is_file()]
+    tell_of_earlier([path for path in there if path not in written])
 
 
 def _write_corrected(calibration: Any, out: Path) -> list[Path]:
@@ -195,10 +207,8 @@ def _write_corrected(calibration: Any, out: Path) -> list[Path]:
     return [out / "corrected.csv", out / "corrected.json"]
 
 
-def _lenses_of(tool: str | None) -> tuple[str, ...]:
-    """The lenses that a tool has; none where no tool is named."""
-    if tool is None:
-        return ()
+def _lenses_of(tool: str) -> tuple[str, ...]:
+    """The lenses that a tool has."""
     from orthoscope.formats.table import tool as record
 
     return record(tool).lenses
@@ -230,11 +240,11 @@ def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: s
 def _write_straight(
     evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None
 ) -> Path:
-    from orthoscope.cli.undistort import straighten, straighten_films, write_beside
+    from orthoscope.cli.undistort import straighten, straighten_films, tell_of_earlier, write_beside
     from orthoscope.files.pictures import MOVING
     from orthoscope.geometry.arrays import InputError
     from orthoscope.straight.film import is_video
-    from orthoscope.straight.outputs import replace_outputs
+    from orthoscope.straight.outputs import of_earlier_runs
     from orthoscope.straight.views import straight_camera
 
     if not files:
@@ -253,7 +263,7 @@ def _write_straight(
             0
         ]
     beside = write_beside(calibration.camera, view, folder, maps=None)
-    replace_outputs(folder, [*written, *beside], paths)
+    tell_of_earlier(of_earlier_runs(folder, [*written, *beside]))
     if others := len(paths) - len(films) - len(photographs):
         tell(f"left out   {others} files of frames that cannot be written straight; convert them", err=True)
     return folder

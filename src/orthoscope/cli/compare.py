@@ -13,6 +13,7 @@ from orthoscope.cli.telling import tell, tell_json
 
 if TYPE_CHECKING:
     from orthoscope.evaluation.comparison.compare import Comparison
+    from orthoscope.evaluation.comparison.entry import Entry
 
 __all__ = ["compare"]
 
@@ -81,17 +82,15 @@ def compare(
     from orthoscope.cli.inputs import detections_from
     from orthoscope.cli.progress import bar
     from orthoscope.evaluation.comparison.compare import compare as judge
-    from orthoscope.evaluation.comparison.entry import USUAL, camera_entry, parse_entry
+    from orthoscope.evaluation.comparison.entry import USUAL, parse_entry
     from orthoscope.files.whole_files import check_folder, write_text
-    from orthoscope.formats.load import SEPARATOR, load_camera
+    from orthoscope.formats.load import SEPARATOR
     from orthoscope.formats.own.json import text_of
     from orthoscope.report.comparison import comparison_page, comparison_svg
 
     check_folder(out)
     entries = [
-        camera_entry(name, load_camera(name, image_size=image_size))
-        if Path(name.split(SEPARATOR)[0]).is_file()
-        else parse_entry(name)
+        _given(name, image_size) if Path(name.split(SEPARATOR)[0]).is_file() else parse_entry(name)
         for name in names or USUAL
     ]
     with threads(jobs, cluster) as executor, bar("detecting") as progress:
@@ -113,6 +112,16 @@ def compare(
         tell_json(texts["comparison.json"])
     else:
         tell(*_lines(comparison), written)
+
+
+def _given(name: str, image_size: tuple[int, int] | None) -> Entry:
+    """The entry of a camera's file; a calibration's shape goes with it."""
+    from orthoscope.evaluation.comparison.entry import camera_entry
+    from orthoscope.fitting.calibration import Calibration
+    from orthoscope.formats.load import load_source
+
+    loaded = load_source(name, image_size=image_size)
+    return camera_entry(name, loaded.camera, calibration=loaded if isinstance(loaded, Calibration) else None)
 
 
 def _lines(comparison: Comparison) -> list[str]:

@@ -47,13 +47,13 @@ def straighten(
     from orthoscope.cli.progress import bar
     from orthoscope.cli.summary import to_json
     from orthoscope.cli.undistort import straighten as write_straight
-    from orthoscope.cli.undistort import write_beside
+    from orthoscope.cli.undistort import tell_of_earlier, write_beside
     from orthoscope.files.images import photographs
     from orthoscope.files.whole_files import check_folder, check_not_onto
     from orthoscope.formats.own.json import save
     from orthoscope.methods.plumb_line.photographs import lens_of_photographs
     from orthoscope.models.lenses import lens_name
-    from orthoscope.straight.outputs import replace_outputs
+    from orthoscope.straight.outputs import of_earlier_runs
     from orthoscope.straight.views import straight_camera
 
     paths = photographs(photos)
@@ -65,7 +65,7 @@ def straighten(
     written, _ = write_straight(paths, found.camera, out, view=view, jobs=jobs, cluster=None)
     beside = write_beside(found.camera, view, out, maps=None)
     save(found.camera, out / "lens.json")
-    replace_outputs(out, [*written, *beside, out / "lens.json"], paths)
+    tell_of_earlier(of_earlier_runs(out, [*written, *beside, out / "lens.json"]))
     centre = found.camera.intrinsics
     name, used = lens_name(found.camera.lens), int(found.used.sum())
     if as_json:

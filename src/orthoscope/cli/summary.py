@@ -120,8 +120,8 @@ def _error_lines(evaluation: Evaluation) -> list[str]:
         f" frame; at the target's distances {pixels(error.near_seen_px)}, {pixels(error.near_frame_px)}",
         f"           of it {pixels(error.model_px)} by independent errors of corners,"
         f" {pixels(error.alike_px)} with errors alike in a view, {pixels(error.views_px)} by leaving views"
-        f" out, {pixels(error.bias_px)} against the"
-        " richest model",
+        f" out, {pixels(error.bias_px)} against the richest model,"
+        f" {pixels(evaluation.disagreement.by_px)} since photographs differ",
     ]
 
 

@@ -10,7 +10,10 @@ import click
 from orthoscope.cli import options
 from orthoscope.cli.telling import tell, tell_json
 
-__all__ = ["straighten", "undistort"]
+__all__ = ["straighten", "tell_of_earlier", "undistort"]
+
+# So many files of earlier runs are named.
+LISTED_FILES = 5
 
 EXAMPLE = """\b
 Examples:
@@ -78,7 +81,7 @@ def undistort(
     from orthoscope.formats.load import load_camera
     from orthoscope.models.camera import Camera
     from orthoscope.straight.film import CODECS, is_video
-    from orthoscope.straight.outputs import replace_outputs
+    from orthoscope.straight.outputs import of_earlier_runs
     from orthoscope.straight.views import share_kept, straight_camera
 
     loaded = load_camera(camera)
@@ -92,17 +95,16 @@ def undistort(
         straighten(paths, loaded, out, view=view, jobs=jobs, cluster=cluster) if paths else ([], [])
     )
     beside = write_beside(loaded, view, out, maps=maps)
-    gone = replace_outputs(out, [*frames, *written, *beside], [*films, *paths])
+    earlier = of_earlier_runs(out, [*frames, *written, *beside])
     if as_json:
         rejected = [{"name": name, "reason": reason} for name, reason in failed]
         made = [str(path) for path in (*frames, *written)]
         numbers = camera_numbers(view) if isinstance(view, Camera) else None
-        removed = [str(path) for path in gone]
-        tell_json(to_json({"written": made, "rejected": rejected, "removed": removed, "camera": numbers}))
+        others = [str(path) for path in earlier]
+        tell_json(to_json({"written": made, "rejected": rejected, "earlier": others, "camera": numbers}))
         return
     wrote_camera = isinstance(view, Camera)
-    if gone:
-        tell(f"removed    {len(gone)} files of an earlier run that this one does not write", err=True)
+    tell_of_earlier(earlier)
     if (share := share_kept(loaded, view)) < 1.0 and keep == "all":
         tell(f"shows      {100 * share:.3g} % of what was photographed ({projection})", err=True)
     made = [f"{film}, {count} frames" for film, count in frames.items()]
@@ -114,6 +116,18 @@ def undistort(
     )
     others += [str(path) for path in beside[wrote_camera:]]
     tell(f"wrote      {'; '.join(made)}" + "".join(f", and {other}" for other in others))
+
+
+def tell_of_earlier(files: list[Path]) -> None:
+    """Say which files in the folder are of earlier runs, and so of the camera that was used then.
+
+    Args:
+        files: these.
+    """
+    if files:
+        listed = ", ".join(path.name for path in files[:LISTED_FILES])
+        more = f" and {len(files) - LISTED_FILES} more" if len(files) > LISTED_FILES else ""
+        tell(f"kept       of earlier runs, whose camera may be another: {listed}{more}", err=True)
 
 
 def write_beside(camera: Any, view: Any, out: Path, *, maps: str | None) -> list[Path]:

@@ -157,28 +157,27 @@ class _Variances:
             by_chance = np.nansum(both**2, axis=(1, 2))
             self.apart, self.by_chance = np.nan_to_num((apart**2).sum(1)), by_chance
             self.bias = np.maximum(self.apart - by_chance, 0.0)
-        self.off = np.zeros(len(rays))
+        self.off, self.differ = np.zeros(len(rays)), given.differ_px**2
         if given.judged is not None:
             off = difference_of_images(scatter.camera, given.judged, rays, rays[:fitted], distance=distance)
             self.off = np.nan_to_num((off**2).sum(1))
             if np.mean(self.off[:fitted]) < AS_GOOD_SHARE**2 * np.nanmean(self.total[:fitted]):
                 self.off[:] = 0.0
-        self.off += given.differ_px**2
 
     @property
     def total(self) -> Float[ndarray, " n"]:
-        return np.maximum(self.alike, self.views) + self.bias + self.off
+        return np.maximum(self.alike, self.views) + self.bias + self.off + self.differ
 
     def over(self, some: slice) -> float:
         """The root mean square of the error over some places; the bias is what is left of it in the mean."""
         alike, views, bias = self._means(some)
-        return float(np.sqrt(max(alike, views) + bias))
+        return float(np.sqrt(max(alike, views) + bias + self.differ))
 
     @property
     def parts(self) -> _Parts:
         """Root mean squares over the places that the motion was fitted to."""
         alike, views, bias = self._means(slice(self.fitted))
-        squares = [max(alike, views) + bias, float(np.nanmean(self.model)), alike, views, bias]
+        squares = [max(alike, views) + bias + self.differ, float(np.nanmean(self.model)), alike, views, bias]
         return _Parts(*np.sqrt(squares).tolist())
 
     def _means(self, some: slice) -> tuple[float, float, float]:

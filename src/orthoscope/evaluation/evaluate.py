@@ -32,7 +32,7 @@ from orthoscope.fitting.fits import Fits
 from orthoscope.fitting.held_out import USUAL_FOLDS
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.usable_views import with_usable_views
-from orthoscope.geometry.arrays import Bool, Float, median, ndarray
+from orthoscope.geometry.arrays import Bool, Float, InputError, median, ndarray
 from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import with_error
 from orthoscope.methods import check_settings
@@ -157,6 +157,11 @@ def evaluate(
     Raises:
         InputError: the calibration's method or a setting is none, or folds are fewer than two.
     """
+    if not isinstance(calibration, Calibration):
+        raise InputError(
+            f"what is to be judged is a {type(calibration).__name__}; expected a calibration. A camera alone"
+            " is judged on photographs: orthoscope.evaluate_on(camera, detections), or check_camera."
+        )
     check_settings(calibration.method, calibration.settings)
     misfits = misfit(calibration)  # before the fits, which take as much room
     fits, residuals = fits_of(calibration), calibration.residuals()

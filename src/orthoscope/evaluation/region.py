@@ -73,7 +73,7 @@ def between(seen: Float[ndarray, "s 2"], pixels: Float[ndarray, "n 2"], margin: 
     Args:
         margin: beyond them, pixels.
     """
-    return (pixels @ _directions().T <= _ends(seen, margin)).all(1)
+    return np.all(pixels @ _directions().T <= _ends(seen, margin), axis=1)
 
 
 def inside(polygon: Float[ndarray, "n 2"], pixels: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:

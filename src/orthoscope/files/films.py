@@ -64,7 +64,11 @@ def frames_of(path: Path, *, most: int = MOST_FRAMES) -> list[Frame]:
     frames = worth_looking_at(_read(film, rate), most=most)
     film.release()
     if not frames:
-        raise InputError(f"{path} cannot be read as a film; expected one of {', '.join(FILMS)}. Convert it.")
+        size = Path(path).stat().st_size if Path(path).is_file() else 0
+        what = "cannot be read as a film, or is cut off" if size else "is empty"
+        raise InputError(
+            f"{path} {what}; expected a whole film ({', '.join(FILMS)}). Copy it again or convert it."
+        )
     return frames
 
 

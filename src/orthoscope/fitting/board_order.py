@@ -172,22 +172,24 @@ class _Sums:
         smooth = polynomials(points, np.ones(p, dtype=bool))
         r, k, square = smooth.shape[1], len(free), 0.0
         gram, right = np.empty((m, len(turns), k + 3 * r, k + 3 * r)), np.empty((m, len(turns), k + 3 * r))
-        shown = [
-            (smooth[turn.corners][:, None, :, None] * turn.rotation.T[None, :, None, :]).reshape(p, 3, 3 * r)
-            for turn in turns
-        ]
+        shown = [_shown(turn, smooth, k) for turn in turns]
+        buffer = np.empty((min(m, VIEWS_AT_ONCE), k + 3 * r, 2 * p))
         for start in range(0, m, VIEWS_AT_ONCE):
             rows = slice(start, start + VIEWS_AT_ONCE)
             pose = np.linalg.qr(slopes.pose[rows].transpose(0, 2, 1))[0]
             y = _without(pose, residual[rows, :, None])
             square += float((y**2).sum())
-            by_camera = _without(pose, slopes.camera[rows].transpose(0, 2, 1))
-            for i, shape in enumerate(shown):
-                pairs = slopes.corner[rows] @ shape  # (v, p, 2, 3r)
-                by_shape = _without(pose, np.concatenate([pairs[:, :, 0], pairs[:, :, 1]], axis=1))
-                columns = np.concatenate([by_camera, by_shape], axis=2)
-                gram[rows, i] = columns.transpose(0, 2, 1) @ columns
-                right[rows, i] = (columns.transpose(0, 2, 1) @ y)[..., 0]
+            columns = buffer[: len(y)]
+            columns[:, :k] = slopes.camera[rows]
+            by_shape = columns[:, k:].reshape(len(y), r, 3, 2, p)
+            np.multiply(
+                slopes.corner[rows].transpose(0, 3, 2, 1)[:, None], smooth.T[:, None, None], out=by_shape
+            )
+            by_pose = columns @ pose
+            unturned = columns @ columns.transpose(0, 2, 1) - by_pose @ by_pose.transpose(0, 2, 1)
+            pulls = (columns @ y)[..., 0]
+            for i, turned in enumerate(shown):
+                gram[rows, i], right[rows, i] = turned.T @ unturned @ turned, pulls @ turned
         freedom = 2 * observations.corners - 6 * m - k
         size = float(np.ptp(points[:, :2], axis=0).max())
         precision = square / max(freedom, 1) / (LIKELY_SHARE * size) ** 2
@@ -198,25 +200,32 @@ class _Sums:
         """Those of some views."""
         return replace(self, gram=self.gram[views], right=self.right[views])
 
-    def shape(self, turns: Int[ndarray, " m"], views: Int[ndarray, " v"]) -> Float[ndarray, " c"]:
-        """Camera and shape that some views tell together, each turned as said."""
-        gram, right = self.gram[views, turns[views]].sum(0), self.right[views, turns[views]].sum(0)
-        return -np.linalg.solve(gram + self.prior, right)
+    def told(
+        self, turns: Int[ndarray, "s m"], say: Float[ndarray, "s m"] | None = None
+    ) -> tuple[Float[ndarray, "s c"], Float[ndarray, " s"]]:
+        """Camera and shape that the views tell together, each turned as said, and the least cost, |y|^2
+        apart; of several ways to turn them at once.
 
-    def costs(self, x: Float[ndarray, " c"]) -> Float[ndarray, "m g"]:
-        """What each view costs under each turn, |y|^2 apart."""
-        return 2.0 * self.right @ x + (self.gram @ x) @ x
+        Args:
+            say: of each view, 1 by default.
+        """
+        ways, (m, g) = len(turns), self.gram.shape[:2]
+        turned = (turns[..., None] == np.arange(g)) * (1.0 if say is None else say[..., None])
+        gram, right = (
+            turned.reshape(ways, m * g) @ part.reshape(m * g, -1) for part in (self.gram, self.right)
+        )
+        x = -np.linalg.solve(gram.reshape(ways, *self.prior.shape) + self.prior, right[..., None])[..., 0]
+        return x, (right * x).sum(1)
+
+    def best_turns(self, x: Float[ndarray, "s c"]) -> Int[ndarray, "s m"]:
+        """The turn with which each view costs least, for each of several cameras and shapes."""
+        pulls = (self.gram.reshape(-1, x.shape[1]) @ x.T).reshape(*self.right.shape, len(x))
+        return ((2.0 * self.right[..., None] + pulls) * x.T).sum(2).argmin(1).T
 
     def telling(self, views: int) -> Int[ndarray, " v"]:
         """The views, at most so many, that tell most of the target's shape by themselves."""
         told = np.trace(self.gram[:, 0, self.named :, self.named :], axis1=1, axis2=2)
         return np.argsort(-told, kind="stable")[:views]
-
-    def total(self, turns: Int[ndarray, " m"]) -> tuple[float, Float[ndarray, " c"]]:
-        """The least cost for these turns, |y|^2 apart, and where it is."""
-        every = np.arange(len(turns))
-        x = self.shape(turns, every)
-        return float(self.costs(x)[every, turns].sum() + x @ self.prior @ x), x
 
     def likeness(self, turns: Int[ndarray, " m"], x: Float[ndarray, " c"], noise: float) -> float:
         """How much larger smooth patterns are in what is left of each view than independent errors make
@@ -235,48 +244,59 @@ def _chosen(sums: _Sums) -> Int[ndarray, " m"]:
     """The turn of each view, 0 where it stays; all 0 where no turns are surely better."""
     m = len(sums.gram)
     none = np.zeros(m, dtype=np.int64)
-    before, _ = sums.total(none)
+    _, (before,) = sums.told(none[None])
     if m <= SEARCHED_VIEWS:
         best = _searched(sums)
     else:
         some = sums.only(sums.telling(SEARCHED_VIEWS))
-        best = _settled(sums, some.total(_searched(some))[1])
-    cost, _ = sums.total(best)
+        (best,) = _settled(sums, some.told(_searched(some)[None])[0])
     best = _least_turned(best, sums.after)
+    (x,), (cost,) = sums.told(best[None])
     noise = max(sums.square + cost, 1e-12 * sums.square) / max(sums.freedom, 1)
-    needed = (
-        SURE_GAIN * noise * sums.likeness(best, sums.total(best)[1], noise) * max(int((best > 0).sum()), 1)
-    )
-    return best if before - cost > needed else none
+    needed = SURE_GAIN * noise * max(int((best > 0).sum()), 1)
+    if before - cost <= needed:
+        return none
+    return best if before - cost > needed * sums.likeness(best, x, noise) else none
 
 
 def _searched(sums: _Sums) -> Int[ndarray, " m"]:
     """The best end that taking one view after the other for the right one comes to."""
-    best = np.zeros(len(sums.gram), dtype=np.int64)
-    cost, _ = sums.total(best)
-    for first in sums.telling(START_VIEWS):
-        tried = _settled(sums, sums.shape(np.zeros_like(best), np.array([first])))
-        total, _ = sums.total(tried)
-        if total < cost - 1e-9 * sums.square:
-            best, cost = tried, total
-    return best
+    firsts = sums.telling(START_VIEWS)
+    none = np.zeros((1 + len(firsts), len(sums.gram)), dtype=np.int64)
+    alone = np.zeros((len(firsts), len(sums.gram)))
+    alone[np.arange(len(firsts)), firsts] = 1.0
+    ends = none.copy()  # the first: as the lists came
+    ends[1:] = _settled(sums, sums.told(none[1:], alone)[0])
+    costs = sums.told(ends)[1]
+    costs[1:] += 1e-9 * sums.square
+    return ends[costs.argmin()]
 
 
-def _settled(sums: _Sums, told: Float[ndarray, " c"]) -> Int[ndarray, " m"]:
-    """The turns that a camera and a shape come to, which are found anew from all views again and again."""
-    every = np.arange(len(sums.gram))
-    tried = np.zeros_like(every)
+def _settled(sums: _Sums, x: Float[ndarray, "s c"]) -> Int[ndarray, "s m"]:
+    """The turns that cameras and shapes come to, which are found anew from all views again and again."""
+    tried = np.zeros((len(x), len(sums.gram)), dtype=np.int64)
     for _ in range(ROUND_LIMIT):
-        before, tried = tried, sums.costs(told).argmin(1)
+        before, tried = tried, sums.best_turns(x)
         if (tried == before).all():
             break
-        told = sums.shape(tried, every)
+        x, _ = sums.told(tried)
     return tried
 
 
 def _least_turned(chosen: Int[ndarray, " m"], after: Int[ndarray, "g g"]) -> Int[ndarray, " m"]:
     """The same order of all views against each other, with as few of them turned as can be."""
     return min((seen_from[chosen] for seen_from in after), key=lambda some: int((some > 0).sum()))
+
+
+def _shown(turn: Turn, smooth: Float[ndarray, "p r"], named: int) -> Float[ndarray, "c c"]:
+    """What a turned view sees of camera and shape, in the same unknowns: smooth shapes of the whole target,
+    turned, are such shapes again.
+    """
+    of_smooth = np.linalg.lstsq(smooth, smooth[turn.corners], rcond=None)[0]
+    r = smooth.shape[1]
+    shown = np.eye(named + 3 * r)
+    shown[named:, named:] = np.einsum("st,ab->sbta", of_smooth, turn.rotation).reshape(3 * r, 3 * r)
+    return shown
 
 
 def _after(turns: list[Turn]) -> Int[ndarray, "g g"]:

@@ -75,6 +75,9 @@ class Exported(NamedTuple):
     def remarks(self) -> tuple[str, ...]:
         """What one must know of the file, a sentence each; none where it is the camera itself."""
         held, told = self.held, []
+        holding = self.tool.holding(held.camera.lens)
+        if holding and holding.note:
+            told.append(f"{lens_name(held.camera.lens)}: {holding.note}")
         if held.lacks:
             told.append(
                 f"{lens_name(held.camera.lens)}, since {self.tool.name} cannot hold {held.lacks}:"
@@ -170,6 +173,10 @@ def exportable(camera: Camera, tool: str, *, made_from: Calibration | None = Non
         return Exportable(camera, 0.0, 0.0, where, "", beyond)
     rays = camera.unproject(frame_grid(camera.image_size) if made_from is None else _corners(made_from))
     rays = rays[np.isfinite(rays).all(1)]
+    if not len(rays):
+        raise CalibrationError(
+            "the lens has no image within the frame: no camera is like it. Mend its numbers."
+        )
     other, holding = _nearest(camera, rays, record)
     apart = np.hypot(*(other.project(rays) - camera.project(rays)).T)
     beyond = share_beyond(other, holding.farthest_deg)

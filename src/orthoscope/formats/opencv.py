@@ -174,7 +174,13 @@ OPENCV = Format(
     holdings=(
         Holding("brown", "cv2", OPENCV_ORDER[:5]),
         Holding("rational", "cv2", OPENCV_ORDER[:8]),
-        Holding("kannala_brandt", "cv2.fisheye", ("k1", "k2", "k3", "k4"), farthest_deg=90.0),
+        Holding(
+            "kannala_brandt",
+            "cv2.fisheye",
+            ("k1", "k2", "k3", "k4"),
+            farthest_deg=90.0,
+            note="its coefficients are those of cv2.fisheye, not of cv2.undistort",
+        ),
         Holding("brown", "cv2", OPENCV_ORDER[:12]),
         Holding("rational", "cv2", OPENCV_ORDER[:12]),
         Holding("brown", "cv2", OPENCV_ORDER),

@@ -59,6 +59,7 @@ class Holding(NamedTuple):
         free: those that a fit for the tool moves; by default the lens's own choice among `coefficients`.
         farthest_deg: the angle from the axis past which the tool's formula gives no image, or a wrong one.
         written: whether a camera is written so; some words are only read.
+        note: what must be known by who reads it; empty where nothing.
     """
 
     lens: str
@@ -67,6 +68,7 @@ class Holding(NamedTuple):
     free: tuple[str, ...] = ()
     farthest_deg: float = float("inf")
     written: bool = True
+    note: str = ""
 
     def holds(self, lens: Lens) -> bool:
         """Whether this is the lens to the last digit."""

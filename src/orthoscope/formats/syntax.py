@@ -128,7 +128,7 @@ def number(value: Any, what: str, document: Document) -> float:
             converted = float("nan")
         if abs(converted) <= LARGEST_NUMBER:  # which NaN is not
             return converted
-    raise document.refuse(f"has {_shown(value)} as {what}; expected a finite number")
+    raise document.refuse(f"has {_shown(value)} as {what}; expected a number, at most {LARGEST_NUMBER:g}")
 
 
 def whole_number(value: Any, what: str, document: Document) -> int:

@@ -126,6 +126,11 @@ def calibrate(detections: Detections, *, method: str = "decoupled", **settings: 
         CalibrationError: the views cannot tell the camera.
         InputError: a method or a setting that is none.
     """
+    if not isinstance(detections, Detections):
+        raise InputError(
+            f"what is to be calibrated is a {type(detections).__name__}; expected detections. Find corners"
+            " first: orthoscope.detect(photographs, target)."
+        )
     check_settings(method, settings)
     found = METHODS[method](detections, **settings)
     if not has_outlines(detections):

@@ -35,6 +35,8 @@ BISECTION_STEPS = 14
 GAIN_SHARE = 1e-3
 # No image has a side of more pixels; a file that says so is damaged.
 LARGEST_SIDE = 1_000_000
+# No pin-hole has a larger number, pixels; a file that says so is damaged.
+LARGEST_INTRINSIC = 1e9
 # Rays farther from the axis than this, radians, a pin-hole stretches without end.
 WIDEST_ANGLE = np.deg2rad(75.0)
 
@@ -60,6 +62,8 @@ class Intrinsics:
             object.__setattr__(self, name, float(value))
         if self.fx <= 0 or self.fy <= 0:
             raise InputError(f"focal lengths are {self.fx:g} and {self.fy:g} px; expected positive ones.")
+        if max(map(abs, self.as_tuple())) > LARGEST_INTRINSIC:
+            raise InputError(f"intrinsics are {self.as_tuple()}; expected no more than 1e9 px. Mend them.")
 
     def as_tuple(self) -> tuple[float, float, float, float, float]:
         """(fx, fy, cx, cy, skew)."""

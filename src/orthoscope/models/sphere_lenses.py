@@ -85,7 +85,7 @@ class DoubleSphere(_ThroughASurface):
 
     def _second(self, w: ndarray) -> ndarray:
         """The distance from the second sphere's centre."""
-        return np.sqrt((1.0 + self.xi) ** 2 - 2.0 * self.xi * w)
+        return np.sqrt((1.0 + self.xi) * (1.0 + self.xi) - 2.0 * self.xi * w)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

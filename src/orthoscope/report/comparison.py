@@ -51,8 +51,8 @@ NOTES = (
         " error, of held-out photographs: 1 is what rounding to whole pixels alone would give."
     ),
     (
-        "A camera's file stays as it is; only the board's poses are fitted. Where it was made from these very"
-        " photographs, its error is not that of unseen ones."
+        "A camera's file stays as it is; only the board's poses are fitted. What another program's camera was"
+        " made from is not known: made from these very photographs, its error is not that of unseen ones."
     ),
     (
         "Parameters: how many of camera and target shape the data determined; not a whole number where priors"

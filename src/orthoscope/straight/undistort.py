@@ -94,17 +94,26 @@ class Straightener:
         )
 
 
-def undistort(image: ndarray, camera: Camera, *, keep: str = "all", view: View | None = None) -> ndarray:
+def undistort(
+    image: ndarray, camera: Camera | Calibration, *, keep: str = "all", view: View | None = None
+) -> ndarray:
     """One straight picture; for many, a Straightener makes its map only once.
 
     Args:
         image: (h,w) or (h,w,c) of the camera's size.
+        camera: that took it, or its calibration.
         keep: `all` or `valid`.
         view: the straight picture's camera, as `straight_camera` makes it; by default a pin-hole of the same
             size.
     Raises:
-        InputError: the size differs.
+        InputError: there is no picture, or its size differs.
     """
+    if not isinstance(image, np.ndarray) or image.ndim not in (2, 3):
+        raise InputError(
+            f"the picture is {type(image).__name__}; expected an array (h,w) or (h,w,c). Read it with"
+            " orthoscope.read_image, which says what is wrong with a file."
+        )
+    camera = camera.camera if isinstance(camera, Calibration) else camera
     return Straightener(camera, keep=keep, view=view)(image)
 
 

@@ -19,12 +19,13 @@ from helpers.boards import BOARD, NARROW, bent, perfect, photographs_of
 from helpers.real_sets import classic
 from orthoscope.evaluation.comparison.compare import Comparison, Standing, compare, paired_difference
 from orthoscope.evaluation.comparison.conclusions import as_good_as_best, conclusions
-from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
+from orthoscope.evaluation.comparison.entry import USUAL, Entry, camera_entry, parse_entry
 from orthoscope.evaluation.evaluate import evaluate
 from orthoscope.fitting.held_out import held_out, rms_and_error
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods import METHODS
+from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm
 from orthoscope.simulation.scene import Scene, simulate_detections
 from orthoscope.targets.detections import Detections
@@ -338,3 +339,16 @@ def test_printed_it_is_a_line_for_each_entry(comparison):
     for line, standing in zip(lines[1:], comparison.standings, strict=True):
         assert standing.entry.name in line
         assert len(line) < 200
+
+
+def test_a_calibration_is_judged_by_others_photographs_with_the_shape_that_it_learnt():
+    bowed, others = photographs_of(bent(2.0), 8, 1), photographs_of(bent(2.0), 6, 2)
+    made = decoupled(bowed, shape="free", first_lens="formula", base="brown")
+    own, alone = (camera_entry("made", made.camera, calibration=given) for given in (made, None))
+    assert (
+        "made from 8 of these 8 photographs" in compare(bowed, [own, "fccm"], folds=3).standings[-1].failure
+    )
+    with_shape, without = (compare(others, [entry, "fccm"], folds=3) for entry in (own, alone))
+    found = [next(s for s in each.standings if s.entry.name == "made") for each in (with_shape, without)]
+    assert found[0].target_shape == made.target_shape
+    assert found[0].held_out_px < 0.7 * found[1].held_out_px

@@ -10,7 +10,7 @@ from benchmarks.studies.streets import street_camera
 from numpy.testing import assert_allclose
 
 from helpers.real_sets import classic
-from orthoscope.files.images import write_image
+from orthoscope.files.images import read_image, write_image
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.fccm import fccm
 from orthoscope.methods.plumb_line.division import division_of_edges
@@ -79,7 +79,7 @@ def test_the_edges_of_a_board_alone_give_the_image_of_the_full_calibration(datas
     seen = classic(datasets, "opencv-left")
     edges = []
     for number, view in enumerate(seen.views):
-        image = cv2.imread(str(datasets / "opencv-left" / view.image), cv2.IMREAD_GRAYSCALE)
+        image = read_image(datasets / "opencv-left" / view.image, grey=True)
         board = cv2.convexHull(view.pixels.astype(np.float32))
         for edge in edges_of(image, number):
             inside = [

@@ -21,7 +21,8 @@ import numpy as np
 
 from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
 from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
-from orthoscope.fitting.calibration import residuals_of
+from orthoscope.evaluation.same_board import same_board
+from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.disc_centres import has_outlines
 from orthoscope.fitting.held_out import FEWEST_VIEWS, USUAL_FOLDS, folds_of_views, held_out, rms_and_error
 from orthoscope.fitting.resection import resect
@@ -214,20 +215,40 @@ def _given(entry: Entry, camera: Camera, used: Detections, squares: Float[ndarra
     """The standing of a camera from elsewhere, before it is judged."""
     if told := of_another_size(camera, used.image_size):
         return Standing(entry, squares, failure=told)
-    flat = TargetShape("flat", np.zeros_like(used.target.points))
-    return Standing(entry, squares, camera, flat, lens_name(camera.lens))
+    shape = TargetShape("flat", np.zeros_like(used.target.points))
+    if made := entry.calibration:
+        if known := _seen_by(made, used):
+            which = f"{known} of these {len(used.views)} photographs"
+            return Standing(entry, squares, failure=f"it was made from {which}; judge it by others")
+        learnt = made.target_shape
+        try:
+            if (
+                len(learnt.displacements) == len(shape.displacements)
+                and same_board(camera, learnt, used).same
+            ):
+                shape = learnt
+        except CalibrationError as error:
+            return Standing(entry, squares, failure=str(error))
+    return Standing(entry, squares, camera, shape, lens_name(camera.lens))
+
+
+def _seen_by(calibration: Calibration, used: Detections) -> int:
+    """How many of the views a calibration was made from, by their corners."""
+    made_from = {view.pixels.tobytes() for view in calibration.detections.views}
+    return sum(view.pixels.tobytes() in made_from for view in used.views)
 
 
 def _with_poses_alone(standing: Standing, camera: Camera, used: Detections) -> Standing:
-    """The same judged: the camera fixed, the pose of each view fitted."""
+    """The same judged: camera and shape fixed, the pose of each view fitted."""
+    shape = standing.target_shape
     try:
-        poses = resect(camera, used)
+        poses = resect(camera, used, shape=shape)
     except CalibrationError as error:
         return replace(standing, failure=str(error))
-    residuals = residuals_of(camera, poses, used)
+    residuals = residuals_of(camera, poses, used, shape=shape)
     squares = np.array([float((e * e).sum()) for e in residuals])
     held_out_px, error_px = rms_and_error(squares, _corners(used))
-    estimated, observed = lateral_errors(camera, poses, used)
+    estimated, observed = lateral_errors(camera, poses, used, shape=shape)
     nce = normalised_calibration_error(estimated, observed, camera.intrinsics)
     return replace(standing, squares=squares, held_out_px=held_out_px, error_px=error_px, nce=nce)
 

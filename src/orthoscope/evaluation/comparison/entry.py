@@ -10,6 +10,7 @@ import inspect
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import InputError
 from orthoscope.methods import METHODS
 from orthoscope.models.camera import Camera
@@ -33,22 +34,26 @@ AS_IT_IS = "as it is"
 
 
 class Entry(NamedTuple):
-    """A method with its settings, under the name that a user gave it; or a camera that is given."""
+    """A method with its settings, under the name that a user gave it; or a camera that is given, with the
+    calibration that it is of, where that is known.
+    """
 
     name: str
     method: str
     settings: Mapping[str, Any]
     camera: Camera | None = None
+    calibration: Calibration | None = None
 
 
-def camera_entry(name: str, camera: Camera) -> Entry:
+def camera_entry(name: str, camera: Camera, *, calibration: Calibration | None = None) -> Entry:
     """The entry of a camera from elsewhere, which stays as it is: each view's pose alone is fitted.
 
     Args:
         name: that it is shown by, such as its file's.
         camera: of the photographs' size.
+        calibration: that it is of; its target's shape is used where it fits the photographs better.
     """
-    return Entry(name, AS_IT_IS, {}, camera)
+    return Entry(name, AS_IT_IS, {}, camera, calibration)
 
 
 def parse_entry(text: str) -> Entry:

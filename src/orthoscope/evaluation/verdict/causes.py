@@ -35,6 +35,9 @@ STIFF_SHARE = 0.5
 PART_SHARE = 0.15
 # Chance makes hardly so large a share of the corners wild.
 WILD_SHARE = 0.005
+# Where a camera holds over a smaller part than this of what lies between corners, it is not corners that are
+# missing.
+SMALL_PART = 0.5
 # A sentence lists so many images.
 NAMED_IMAGES = 3
 # A principal point that is known no better than this share of the image's width is open.
@@ -116,7 +119,8 @@ def _photographs(s: Situation) -> str:
 
 def _open(s: Situation) -> bool:
     """Whether the camera is not known well enough, and not for lack of corners in some part of the frame."""
-    return s.error_px > FINE_PX or (s.share < WIDE_SHARE and s.covered >= WIDE_SHARE)
+    corners_there = s.covered >= WIDE_SHARE or s.share < SMALL_PART * s.covered
+    return s.error_px > FINE_PX or (s.share < WIDE_SHARE and corners_there)
 
 
 def _as_far_as_known(s: Situation) -> Grade:
@@ -133,7 +137,11 @@ CAUSES: tuple[Cause, ...] = (
         "few",
         lambda s: s.views < FEWEST_PHOTOGRAPHS or (isnan(s.error_px) and s.distinct < FEW_VIEWS),
         lambda s: Grade.NO if s.views < 2 or isnan(s.error_px) else Grade.USABLE,
-        lambda s: f"{_photograph(s.views)} cannot tell how far off it is",
+        lambda s: (
+            f"{_photograph(s.views)} cannot tell how far off it is"
+            if isnan(s.error_px)
+            else f"{_photograph(s.views)} are too few to rely on that"
+        ),
     ),
     Cause(
         "unknown",

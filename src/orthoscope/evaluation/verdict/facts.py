@@ -17,6 +17,7 @@ from orthoscope.evaluation.verdict.situation import Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.near_copies import near_copies
 from orthoscope.geometry.arrays import median
+from orthoscope.models.lenses import lens_name
 from orthoscope.solve.least_squares import Status
 
 __all__ = ["Findings", "corners_beyond", "situation_of"]
@@ -62,7 +63,7 @@ def situation_of(found: Findings) -> Situation:
     told = distinct > DISTINCT_SHARE * views  # copies agree with each other whatever is true
     return Situation(
         method=calibration.method,
-        lens=str(settings.get("lens", "")),
+        lens=_formula_of(calibration),
         shape=calibration.target_shape.kind,
         base=str(settings.get("base", "")),
         first_lens=str(settings.get("first_lens", "")),
@@ -105,6 +106,12 @@ def corners_beyond(calibration: Calibration) -> int:
     views = zip(calibration.camera_from_target, calibration.detections.views, strict=True)
     seen = np.concatenate([pose.apply(points[view.ids]) for pose, view in views])
     return int(np.isnan(calibration.camera.project(seen)[:, 0]).sum())
+
+
+def _formula_of(calibration: Calibration) -> str:
+    """The lens that was asked for, or where none was named the one that it came to."""
+    asked = str(calibration.settings.get("lens", ""))
+    return lens_name(calibration.camera.lens) if asked in ("", "auto") else asked
 
 
 def _centre_deviation(calibration: Calibration) -> float:

@@ -3,7 +3,7 @@
 A grade is given by how far off the camera is where corners were seen (error_px), and by the share of the
 frame over which it is off by FINE_PX at most and corners were seen.  A camera that is too far off for what is
 far away may still serve where the target was (near_px): there a shift of the camera undoes what the
-photographs leave open; where it is right to a quarter of a pixel there and not far off elsewhere, it is good
+photographs leave open; where it is right to a seventh of a pixel there and hardly off elsewhere, it is good
 within that region.  What is known to be wrong (causes.py) can lower a grade, never raise it.
 """
 
@@ -21,9 +21,10 @@ __all__ = ["GRADES", "WIDE_SHARE", "Grade", "by_error", "good_somewhere", "lower
 # reaches.
 WIDE_SHARE = 0.7
 # A camera that is off by no more at the target's distances, pixels, is good there.
-NEAR_FINE_PX = 0.25
-# One that is good there only may be off by no more far away, pixels.
-AWAY_PX = 0.75
+NEAR_FINE_PX = 0.15
+# One that is good there only may be off by no more far away, pixels: of cameras that were said to be off by
+# .5 to .75, one in fifteen was off by more than one.
+AWAY_PX = 0.6
 
 
 class Grade(StrEnum):

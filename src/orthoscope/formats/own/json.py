@@ -52,6 +52,8 @@ KINDS_OF_FILE = {
 }
 # An evaluation judges the file of this name beside its own.
 CALIBRATION_NAME = "calibration.json"
+# Files of these kinds are other programs'.
+OTHER_SUFFIXES = (".yaml", ".yml", ".xml", ".txt", ".csv", ".mat", ".pkl", ".npz")
 
 
 class _Header(msgspec.Struct):
@@ -101,8 +103,14 @@ def save(
     An evaluation is loaded with the calibration that it judges: save that beside it, as calibration.json.
 
     Raises:
-        InputError: the place cannot be written, or a setting has no plain value.
+        InputError: the place cannot be written or is named as another kind of file, or a setting has no plain
+            value.
     """
+    if Path(path).suffix.lower() in OTHER_SUFFIXES:
+        raise InputError(
+            f"{path} is named as another kind of file; ours are JSON. Name it .json, or write a camera for"
+            " another tool: orthoscope.export(calibration, path, tool)."
+        )
     write_text(path, text_of(thing))
 
 
@@ -238,4 +246,7 @@ def _malformed(content: bytes, path: str | Path, error: Exception) -> str:
         return f"{path}, line {line}, has {number[0].decode()}; expected finite numbers. Drop that entry."
     if "truncated" in str(error):
         return f"{path} is cut off; expected whole JSON that orthoscope wrote. Write or copy it again."
-    return f"{path} is not JSON ({error}); expected a file that orthoscope wrote, such as calibration.json."
+    return (
+        f"{path} is not JSON ({error}); expected a file that orthoscope wrote, such as calibration.json."
+        " Cameras of other tools are read by orthoscope.load_camera."
+    )

@@ -63,7 +63,7 @@ OFF_CENTRE = (
     "tau_y",
 )  # what a centre of its own stands for, but for small print
 # The coefficient that scales the photograph; the others have none.
-SCALE: dict[type[Formula], str] = {Pfet: "a1", Fet: "scale"}
+SCALE: dict[type[Lens], str] = {Pfet: "a1", Fet: "scale"}
 # The coefficient that does what a stretched straight image does, so that one of both is held.
 GAUGE: dict[type[Lens], str] = {Pfet: "a1", Fet: "l"}
 

@@ -35,15 +35,15 @@ OUTSIDE = 0.25
 
 
 class GridView(NamedTuple):
-    """The corners of a view.
+    """The corners of a view, or of a stack of views, each filled up with places and pixels that are zeros.
 
     Attributes:
         places: (n,3), on the target, homogeneous, about its middle and in units of its size.
         pixels: (n,2).
     """
 
-    places: Float[ndarray, "n 3"]
-    pixels: Float[ndarray, "n 2"]
+    places: Float[ndarray, "*views n 3"]
+    pixels: Float[ndarray, "*views n 2"]
 
 
 class RadialView(NamedTuple):
@@ -54,8 +54,8 @@ class RadialView(NamedTuple):
         off: (n,) distances of the corners from their radial lines, pixels.
     """
 
-    outwards: Float[ndarray, "n 2"]
-    off: Float[ndarray, " n"]
+    outwards: Float[ndarray, "*views n 2"]
+    off: Float[ndarray, "*views n"]
 
 
 def grid_views(detections: Detections) -> list[GridView]:
@@ -92,20 +92,21 @@ def centre_of_distortion(views: Sequence[GridView], image_size: tuple[int, int])
     reach = OUTSIDE * float(np.hypot(*image_size))
     linear = _linear_centre(views, image_size)
     centre = linear if _within(linear, image_size, reach) else middle
-    off = _off(views, centre)
+    stack = _together(views)
+    off = _off(stack, centre)
     for _ in range(MOVES):
         slopes = np.stack(
             [
-                (_off(views, centre + nudge) - _off(views, centre - nudge)) / (2 * NUDGE_PX)
+                (_off(stack, centre + nudge) - _off(stack, centre - nudge)) / (2 * NUDGE_PX)
                 for nudge in NUDGE_PX * np.eye(2)
             ],
             axis=-1,
         )
         step = -np.linalg.lstsq(slopes, off, rcond=None)[0]
-        share, after = 1.0, _off(views, centre + step)
+        share, after = 1.0, _off(stack, centre + step)
         while share > 1e-3 and after @ after > off @ off:
             share *= 0.5
-            after = _off(views, centre + share * step)
+            after = _off(stack, centre + share * step)
         centre, off = centre + share * step, after
         if np.hypot(*(share * step)) < SETTLED_PX:
             break
@@ -119,27 +120,37 @@ def centre_of_distortion(views: Sequence[GridView], image_size: tuple[int, int])
 
 def radial_view(view: GridView, centre: Float[ndarray, "2"]) -> RadialView:
     """The first two rows of a view's homography about a centre, as what they make of its places."""
-    x, y = (view.pixels - centre).T
-    rows = np.column_stack([-y[:, None] * view.places, x[:, None] * view.places])
-    outwards = np.column_stack([x, y])
+    away = view.pixels - centre
+    x, y = away[..., :1], away[..., 1:]
+    rows = np.concatenate([-y * view.places, x * view.places], axis=-1)
+    outwards = away
     for _ in range(WEIGHINGS):
-        weight = 1.0 / np.maximum(np.hypot(*outwards.T), 1e-12)
-        of_x, of_y = _least_row(rows * weight[:, None]).reshape(2, 3)
-        outwards = np.column_stack([view.places @ of_x, view.places @ of_y])
-    if (outwards[:, 0] * x + outwards[:, 1] * y).sum() < 0:
-        outwards = -outwards
-    length = np.maximum(np.hypot(*outwards.T), 1e-12)
-    return RadialView(outwards, (x * outwards[:, 1] - y * outwards[:, 0]) / length)
+        weight = 1.0 / np.maximum(np.hypot(outwards[..., :1], outwards[..., 1:]), 1e-12)
+        h = _least_row(rows * weight)
+        outwards = view.places @ h.reshape(*h.shape[:-1], 2, 3).swapaxes(-1, -2)
+    outwards = np.where((outwards * away).sum((-2, -1), keepdims=True) < 0, -outwards, outwards)
+    length = np.maximum(np.hypot(outwards[..., 0], outwards[..., 1]), 1e-12)
+    return RadialView(outwards, (x[..., 0] * outwards[..., 1] - y[..., 0] * outwards[..., 0]) / length)
 
 
-def _least_row(rows: Float[ndarray, "n k"]) -> Float[ndarray, " k"]:
+def _least_row(rows: Float[ndarray, "*views n k"]) -> Float[ndarray, "*views k"]:
     """The unit vector that many rows come nearest to leaving at nothing, by their triangle alone."""
-    return np.linalg.svd(np.linalg.qr(rows, mode="r"))[2][-1]
+    return np.linalg.svd(np.linalg.qr(rows, mode="r"))[2][..., -1, :]
 
 
-def _off(views: Sequence[GridView], centre: Float[ndarray, "2"]) -> Float[ndarray, " n"]:
-    """The distances of all corners from their radial lines."""
-    return np.concatenate([radial_view(view, centre).off for view in views])
+def _together(views: Sequence[GridView]) -> GridView:
+    """All views as one stack."""
+    widest = max(len(view.pixels) for view in views)
+    stack = GridView(np.zeros((len(views), widest, 3)), np.zeros((len(views), widest, 2)))
+    for number, view in enumerate(views):
+        stack.places[number, : len(view.places)] = view.places
+        stack.pixels[number, : len(view.pixels)] = view.pixels
+    return stack
+
+
+def _off(stack: GridView, centre: Float[ndarray, "2"]) -> Float[ndarray, " n"]:
+    """The distances of all corners from their radial lines, 0 where a view is filled up."""
+    return radial_view(stack, centre).off.ravel()
 
 
 def _linear_centre(views: Sequence[GridView], image_size: tuple[int, int]) -> Float[ndarray, "2"]:
