@@ -167,7 +167,7 @@ def _reaches_over(board: Circles, ids: Int[ndarray, " n"]) -> bool:
     """
     row, column = np.divmod(ids[ids >= 0], board.columns)
     ends = row.min() == 0, row.max() == board.rows - 1, column.min() == 0, column.max() == board.columns - 1
-    return all(ends) and (ids >= 0).all() and 2 * len(ids) >= board.columns * board.rows
+    return all(ends) and bool((ids >= 0).all()) and 2 * len(ids) >= board.columns * board.rows
 
 
 def _of_same(board: Circles, discs: Ellipses, ways: list[ndarray]) -> tuple[Int[ndarray, " n"], bool]:

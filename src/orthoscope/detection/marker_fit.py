@@ -148,7 +148,7 @@ class _Fit:
         cv2.fillConvexPoly(mask, np.rint((rim - low) * 16).astype(np.int32), 1, shift=4)
         self._inside = np.flatnonzero(mask)
         self._values = self._picture.take(self._inside)
-        self._places = np.stack(np.divmod(self._inside, mask.shape[1])[::-1]).astype(np.float32)
+        self._places = np.stack(np.divmod(self._inside, self._picture.shape[1])[::-1]).astype(np.float32)
         self._basis_inside = self._basis(self._places)
         square = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).min() / len(black)
         self._samples = int(np.clip(np.ceil(SAMPLES_PER_MODULE / max(square, 1e-3)), 1, MOST_SAMPLES))
