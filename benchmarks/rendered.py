@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import Scene, random_views
 from orthoscope.targets.target import chessboard

@@ -23,8 +23,9 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Uncertainty
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.paper.documents import documents
 from orthoscope.paper.entries import PaperEntry
 from orthoscope.paper.section4 import Plan, run

@@ -19,7 +19,7 @@ from benchmarks.rows import Part, Row  # noqa: E402
 from benchmarks.workers.pose_refit import refit_pose, rotation_of  # noqa: E402
 
 from orthoscope import Camera, Detections, Intrinsics, Pose, View, chessboard  # noqa: E402
-from orthoscope.models.lenses import Brown  # noqa: E402
+from orthoscope.models.lenses.table import Brown  # noqa: E402
 
 CAMERA = Camera((640, 480), Intrinsics(750.0, 751.0, 321.0, 243.0), Brown(k1=-0.2, p1=0.001))
 POSE = Pose(rotation_of(np.array([0.4, -0.3, 0.2])), np.array([-0.05, -0.04, 0.6]))

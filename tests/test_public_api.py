@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import orthoscope
 from helpers.scenes import NARROW, camera_with, photographed
 from orthoscope.methods import settings, settings_of
-from orthoscope.models.lenses import LENSES, Brown
+from orthoscope.models.lenses.table import LENSES, Brown
 from orthoscope.simulation.render import rendered_photographs
 
 SOURCE = Path(orthoscope.__file__).parent

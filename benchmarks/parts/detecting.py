@@ -13,7 +13,7 @@ from benchmarks.peers import Peers
 from benchmarks.race import race
 from benchmarks.rendered import Condition, Photographs, rendered
 from benchmarks.rows import Part, Row
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 
 __all__ = ["accuracy", "detecting"]
 

@@ -1,5 +1,5 @@
-"""Error on photographs that were not used, on real sets: the protocol of orthoscope.fitting.held_out for
-every peer.
+"""Error on photographs that were not used, on real sets: the protocol of `held_out`, for every
+peer.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from benchmarks.corner_files import write_corners
 from benchmarks.peers import Peers
 from benchmarks.real_sets import SETS, babel_cube, classic_corners, datasets, zhang
 from benchmarks.rows import Part, Row
-from orthoscope.fitting.held_out import folds_of_views
+from orthoscope.fitting.unseen.held_out import folds_of_views
 from orthoscope.methods.fccm import fccm
 from orthoscope.targets.detections import Detections
 

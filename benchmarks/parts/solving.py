@@ -13,8 +13,9 @@ from benchmarks.corner_files import write_corners
 from benchmarks.peers import Peers
 from benchmarks.race import Result, race
 from benchmarks.rows import Part, Row
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import chessboard

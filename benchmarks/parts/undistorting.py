@@ -21,8 +21,9 @@ from orthoscope.files.images import read_image
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.formats.own.json import save
 from orthoscope.methods.fccm import fccm
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import rendered_photographs
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.target import chessboard

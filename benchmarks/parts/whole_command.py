@@ -20,8 +20,9 @@ from benchmarks.real_sets import datasets
 from benchmarks.rows import Part, Row
 from orthoscope.formats.corners_vnl import write_vnl
 from orthoscope.formats.own.json import save
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import chessboard

@@ -27,8 +27,9 @@ from orthoscope.detection.table import see
 from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.simulation.render import BLACK_LEVEL, WHITE_LEVEL, Renderer
 from orthoscope.simulation.scene import random_views
 from orthoscope.targets.table import parse_target

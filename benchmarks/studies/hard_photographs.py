@@ -21,12 +21,13 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.detection.chessboard import see_chessboard
+from orthoscope.detection.chessboards.chessboard import see_chessboard
 from orthoscope.detection.sight import Sight
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import BLACK_LEVEL, WHITE_LEVEL, Renderer
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.target import Target, target_of

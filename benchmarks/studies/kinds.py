@@ -26,8 +26,9 @@ from orthoscope.detection.table import see
 from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods import calibrate
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import random_views
 from orthoscope.targets.table import parse_target

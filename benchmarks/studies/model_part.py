@@ -20,15 +20,16 @@ from itertools import product
 import numpy as np
 
 from orthoscope.evaluation.camera_error import seen_places
-from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
-from orthoscope.fitting.leave_one_out import leave_one_out
-from orthoscope.fitting.scatter import Scatter, scatter_of
-from orthoscope.geometry.blas import with_one_thread
+from orthoscope.fitting.slopes.image_slopes import difference_of_images, image_slopes, motion_slopes
+from orthoscope.fitting.unseen.leave_one_out import leave_one_out
+from orthoscope.fitting.unseen.scatter import Scatter, scatter_of
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.fccm import fit_flat
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections
 from orthoscope.targets.target import chessboard

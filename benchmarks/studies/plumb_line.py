@@ -21,8 +21,8 @@ from orthoscope.methods.plumb_line.edges import Edge, edges_of
 from orthoscope.methods.plumb_line.plumb_line import lens_of_edges
 from orthoscope.models.camera import Camera
 from orthoscope.models.difference import frame_grid
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Brown, Division, KannalaBrandt, lens_name
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import Brown, Division, KannalaBrandt, lens_name
 
 __all__ = ["STREET_LENSES", "apart", "street_edges"]
 

@@ -22,7 +22,7 @@ from typing import Any
 # module and name of what is timed, and what it is called; the solver first, before others import it by name
 TIMED = (
     ("orthoscope.solve.least_squares", "solve", "in all of these: the solver's loops"),
-    ("orthoscope.cli.inputs", "detections_from", "photographs or tables to corners"),
+    ("orthoscope.cli.shared.inputs", "detections_from", "photographs or tables to corners"),
     ("orthoscope.methods", "calibrate", "choice and fits"),
     ("orthoscope.evaluation.evaluate", "evaluate", "evaluation"),
     ("orthoscope.formats.own.json", "save", "JSON"),

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 from numpy import ndarray
 
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.lens import Lens
 
 __all__ = ["street_camera", "street_photograph"]
 

@@ -12,7 +12,7 @@ from corners import Corners, Fit, tasks_of
 from served import serve, timed
 
 from orthoscope import METHODS, Calibration, Camera, Detections, Intrinsics, View
-from orthoscope.models.lenses import Brown
+from orthoscope.models.lenses.table import Brown
 from orthoscope.targets.target import Target
 from orthoscope.version import __version__
 
@@ -81,7 +81,7 @@ def find(**request: Any) -> dict[str, Any]:
     import cv2
     from found import finding
 
-    from orthoscope.detection.chessboard import find_chessboard
+    from orthoscope.detection.chessboards.chessboard import find_chessboard
 
     cv2.setNumThreads(1)
     return finding({"orthoscope": lambda grey, grid: find_chessboard(grey, *grid)})(**request)

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from orthoscope.files.images import write_image as write_image
     from orthoscope.fitting.calibration import Calibration as Calibration
     from orthoscope.fitting.calibration import Uncertainty as Uncertainty
-    from orthoscope.fitting.held_out import held_out as held_out
     from orthoscope.fitting.resection import resect as resect
+    from orthoscope.fitting.unseen.held_out import held_out as held_out
     from orthoscope.formats.export import export as export
     from orthoscope.formats.load import load_camera as load_camera
     from orthoscope.formats.own.json import load as load
@@ -48,10 +48,10 @@ if TYPE_CHECKING:
     from orthoscope.methods import METHODS as METHODS
     from orthoscope.methods import calibrate as calibrate
     from orthoscope.models.camera import Camera as Camera
-    from orthoscope.models.camera import Intrinsics as Intrinsics
     from orthoscope.models.difference import image_difference as image_difference
-    from orthoscope.models.lens import Lens as Lens
-    from orthoscope.models.lenses import LENSES as LENSES
+    from orthoscope.models.intrinsics import Intrinsics as Intrinsics
+    from orthoscope.models.lenses.lens import Lens as Lens
+    from orthoscope.models.lenses.table import LENSES as LENSES
     from orthoscope.models.target_shape import TargetShape as TargetShape
     from orthoscope.report.page import write_report as write_report
     from orthoscope.simulation.render import render as render
@@ -75,7 +75,7 @@ ROOMS = {
     "evaluation.metrics": ("normalised_calibration_error",),
     "files.images": ("read_image", "write_image"),
     "fitting.calibration": ("Calibration", "Uncertainty"),
-    "fitting.held_out": ("held_out",),
+    "fitting.unseen.held_out": ("held_out",),
     "fitting.resection": ("resect",),
     "formats.export": ("export",),
     "formats.load": ("load_camera",),
@@ -84,10 +84,11 @@ ROOMS = {
     "geometry.arrays": ("CalibrationError", "InputError"),
     "geometry.pose": ("Pose",),
     "methods": ("METHODS", "calibrate"),
-    "models.camera": ("Camera", "Intrinsics"),
+    "models.camera": ("Camera",),
     "models.difference": ("image_difference",),
-    "models.lens": ("Lens",),
-    "models.lenses": ("LENSES",),
+    "models.intrinsics": ("Intrinsics",),
+    "models.lenses.lens": ("Lens",),
+    "models.lenses.table": ("LENSES",),
     "models.target_shape": ("TargetShape",),
     "report.page": ("write_report",),
     "simulation.render": ("render",),
@@ -108,7 +109,7 @@ def __getattr__(name: str) -> Any:
     try:
         return getattr(importlib.import_module(f"orthoscope.{_ROOM_OF[name]}"), name)
     except ModuleNotFoundError as error:
-        from orthoscope.geometry.missing import how_to_install
+        from orthoscope.machine.missing import how_to_install
 
         if (told := how_to_install(error)) is None:
             raise

@@ -14,8 +14,9 @@ import pytest
 
 from orthoscope.cli import main
 from orthoscope.files.images import write_image
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import Renderer, rendered_photographs
 from orthoscope.simulation.scene import Scene, random_views
 from orthoscope.targets.target import chessboard

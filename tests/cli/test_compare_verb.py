@@ -11,7 +11,7 @@ import pytest
 
 from orthoscope.cli.compare import compare
 from orthoscope.evaluation.comparison.entry import USUAL
-from orthoscope.fitting.held_out import USUAL_FOLDS
+from orthoscope.fitting.unseen.held_out import USUAL_FOLDS
 from orthoscope.formats.own.json import load, load_detections, save
 
 FILES = {"comparison.json", "comparison.html", "comparison.svg"}

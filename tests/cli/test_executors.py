@@ -16,7 +16,7 @@ from operator import call
 
 import pytest
 
-from orthoscope.cli.executors import cluster, processes, threads
+from orthoscope.cli.shared.executors import cluster, processes, threads
 from orthoscope.paper.entries import PAPER
 from orthoscope.paper.trials import Condition, Study, trial_outcomes
 
@@ -98,7 +98,7 @@ def test_nobody_stays_behind_when_a_verb_is_stopped(tmp_path, how):
 
 
 def test_a_cluster_that_is_not_there_is_named(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("orthoscope.cli.executors.ANSWER_TIMEOUT", 0.5)
+    monkeypatch.setattr("orthoscope.cli.shared.executors.ANSWER_TIMEOUT", 0.5)
     result = run(
         "detect", tmp_path, "--target", TARGET, "--cluster", "tcp://127.0.0.1:9", "-o", tmp_path / "out.json"
     )

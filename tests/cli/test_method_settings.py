@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
 
-from orthoscope.cli.method_settings import settings_from
+from orthoscope.cli.shared.method_settings import settings_from
 from orthoscope.cli.simulate import simulate
 from orthoscope.formats.own.json import load_detections
 from orthoscope.geometry.arrays import InputError

@@ -39,7 +39,7 @@ def test_without_opencv_python_says_which_to_install():
 
 def test_without_opencv_cameras_are_still_read_and_written(tmp_path):
     told = run(
-        "import orthoscope as o; from orthoscope.models.lenses import Brown;"
+        "import orthoscope as o; from orthoscope.models.lenses.table import Brown;"
         " c = o.Camera((640, 480), o.Intrinsics(500.0, 500.0, 320.0, 240.0), Brown(k1=-0.1));"
         f" o.export(c, {str(tmp_path / 'a.yaml')!r}, 'opencv');"
         f" print(o.load_camera({str(tmp_path / 'a.yaml')!r}))"

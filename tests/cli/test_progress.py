@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orthoscope.cli import progress
+from orthoscope.cli.shared import progress
 
 
 @pytest.mark.parametrize(("lines", "seconds", "told"), [(False, 0.0, 0), (True, 3600.0, 0), (True, 0.0, 3)])

@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 import pytest
 
-from orthoscope.cli.executors import threads
+from orthoscope.cli.shared.executors import threads
 from orthoscope.formats.export import export
 from orthoscope.formats.own.json import load, save
-from orthoscope.models.camera import Intrinsics
+from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.simulation.scene import simulate_detections
 from orthoscope.targets.detections import Detections, SetAside
 
@@ -97,7 +97,7 @@ def test_sigterm_ends_a_verb_whose_file_never_answers(tmp_path):
 
 
 def test_a_thread_that_never_answers_is_not_waited_for(monkeypatch):
-    monkeypatch.setattr("orthoscope.cli.executors.PATIENCE", 0.1)
+    monkeypatch.setattr("orthoscope.cli.shared.executors.PATIENCE", 0.1)
     hold, begun = threading.Event(), time.monotonic()
 
     def stopped() -> None:

@@ -11,8 +11,8 @@ from helpers.quick import first_quick
 from orthoscope.formats.load import load_camera
 from orthoscope.formats.own.json import load_calibration
 from orthoscope.models.difference import image_difference
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.table import Brown, KannalaBrandt, Rational
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from benchmarks.studies.streets import street_camera, street_photograph
 
 from orthoscope.files.images import write_image
 from orthoscope.formats.load import load_camera
-from orthoscope.models.lenses import Brown
+from orthoscope.models.lenses.table import Brown
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orthoscope.cli.exit_codes import DONE, NOT_TO_BE_USED
+from orthoscope.cli.shared.exit_codes import DONE, NOT_TO_BE_USED
 from orthoscope.formats.own.json import save
 from orthoscope.simulation.scene import simulate_detections
 

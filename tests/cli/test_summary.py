@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orthoscope.cli.summary import evaluation_lines
+from orthoscope.cli.shared.summary import evaluation_lines
 from orthoscope.evaluation.evaluate import Evaluation, evaluate
 from orthoscope.methods.fccm import fccm
 from orthoscope.simulation.scene import paper_scene, simulate_detections

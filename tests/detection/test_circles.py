@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orthoscope.detection.circles import see_circles
 from orthoscope.detection.detect import detect
-from orthoscope.detection.disc_outlines import refined_discs
+from orthoscope.detection.discs.circles import see_circles
+from orthoscope.detection.discs.disc_outlines import refined_discs
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import Renderer
 from orthoscope.targets.circles import Circles
 from orthoscope.targets.target import target_of

@@ -12,13 +12,14 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from helpers.quick import first_quick
-from orthoscope.detection.chessboard import find_chessboard
+from orthoscope.detection.chessboards.chessboard import find_chessboard
 from orthoscope.detection.detect import detect
 from orthoscope.files.images import read_image, write_image
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.fccm import fccm
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import random_views
 from orthoscope.targets.detections import Detections, View

@@ -14,8 +14,9 @@ from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import DETECTORS, see
 from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import random_views
 from orthoscope.targets.table import TARGETS

@@ -10,8 +10,9 @@ from numpy.testing import assert_array_equal
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import Renderer
 from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.charuco import Charuco

@@ -12,8 +12,9 @@ from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.table import see
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import Renderer
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.marked_chessboard import MarkedChessboard

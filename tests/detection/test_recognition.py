@@ -8,8 +8,9 @@ import pytest
 
 from orthoscope.detection.recognition.recognise import recognise
 from orthoscope.geometry.arrays import CalibrationError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import random_views
 from orthoscope.targets.table import parse_target

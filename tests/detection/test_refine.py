@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from orthoscope.detection.grid import grid_shape, lattice, nearest_neighbour, one_line_more
-from orthoscope.detection.refine import refined
-from orthoscope.detection.saddle import fit_saddles
+from orthoscope.detection.chessboards.grid import grid_shape, lattice, nearest_neighbour, one_line_more
+from orthoscope.detection.saddles.refine import refined
+from orthoscope.detection.saddles.saddle import fit_saddles
 
 PLACE = np.array([[20.3, 19.6]])
 

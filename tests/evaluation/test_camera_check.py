@@ -14,7 +14,7 @@ from orthoscope.evaluation.evaluate import examine
 from orthoscope.evaluation.verdict.grades import Grade
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.models.camera import Camera
-from orthoscope.models.lenses import Brown
+from orthoscope.models.lenses.table import Brown
 from orthoscope.targets.detections import Detections
 
 

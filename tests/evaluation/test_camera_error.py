@@ -13,9 +13,15 @@ from helpers.scenes import NARROW, WIDE, photographed
 from orthoscope.evaluation.camera_error import CameraError, predicted_error, rms_difference, seen_places
 from orthoscope.evaluation.region import MARGIN_SHARE, between
 from orthoscope.evaluation.verdict.situation import FINE_PX
-from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
-from orthoscope.fitting.leave_one_out import leave_one_out
-from orthoscope.fitting.scatter import STRETCH_SHARE, Scatter, likenesses, patterns_over_views, scatter_of
+from orthoscope.fitting.slopes.image_slopes import difference_of_images, image_slopes, motion_slopes
+from orthoscope.fitting.unseen.leave_one_out import leave_one_out
+from orthoscope.fitting.unseen.scatter import (
+    STRETCH_SHARE,
+    Scatter,
+    likenesses,
+    patterns_over_views,
+    scatter_of,
+)
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.decoupled.step_one import fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised

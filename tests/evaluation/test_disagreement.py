@@ -12,8 +12,8 @@ from helpers.boards import NARROW, perfect
 from helpers.studied import Recipe, found_in, made, photographs_by, richest_fit
 from orthoscope.evaluation.disagreement import changes_of, disagreement, spread_of, wishes
 from orthoscope.evaluation.groups import two_groups
-from orthoscope.fitting.leave_one_out import leave_one_out
-from orthoscope.models.lenses import Brown
+from orthoscope.fitting.unseen.leave_one_out import leave_one_out
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.scene import simulate_detections
 
 USUAL = Recipe()

@@ -20,13 +20,14 @@ from orthoscope.evaluation.coverage import corners_by_cell, emptiest_place
 from orthoscope.evaluation.evaluate import Evaluation, evaluate, evaluate_on
 from orthoscope.evaluation.verdict.grades import Grade
 from orthoscope.fitting.calibration import rms
-from orthoscope.fitting.held_out import held_out
+from orthoscope.fitting.unseen.held_out import held_out
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections

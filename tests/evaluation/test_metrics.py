@@ -10,8 +10,9 @@ from orthoscope.evaluation.coverage import COVERAGE_GRID, corners_by_cell
 from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration_error
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import WIDEST_ANGLE, Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import chessboard
 

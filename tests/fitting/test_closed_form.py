@@ -18,7 +18,8 @@ from helpers.scenes import (
     some_corners,
     turned_boards,
 )
-from orthoscope.fitting.closed_form import (
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.starts.closed_form import (
     CENTRED,
     CENTRED_SQUARE,
     GENERAL,
@@ -26,11 +27,11 @@ from orthoscope.fitting.closed_form import (
     intrinsics_of_homographies,
     poses_of_camera,
 )
-from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Brown, Pfet
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import Brown, Pfet
 from orthoscope.simulation.scene import random_views
 from orthoscope.targets.detections import Detections
 

@@ -13,8 +13,9 @@ from orthoscope.fitting.disc_centres import at_disc_centres, disc_offsets, has_o
 from orthoscope.formats.own.json import load_detections, save
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.methods import METHODS, calibrate
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.circles import Circles
 from orthoscope.targets.detections import Detections, View

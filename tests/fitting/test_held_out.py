@@ -15,8 +15,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.scenes import BOARD, NARROW, facing, photographed, seen
 from orthoscope.fitting.calibration import residuals_of
-from orthoscope.fitting.held_out import HeldOut, folds_of_views, held_out
 from orthoscope.fitting.resection import resect
+from orthoscope.fitting.unseen.held_out import HeldOut, folds_of_views, held_out
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.fccm import fccm
 from orthoscope.targets.detections import Detections

@@ -9,17 +9,18 @@ import pytest
 from numpy.testing import assert_allclose
 
 from helpers.scenes import BOARD, NARROW, WIDE, camera_with, facing, photographed, seen
-from orthoscope.fitting.initial_camera import (
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.starts.initial_camera import (
     FIELDS_OF_VIEW,
     Assumptions,
     StartingCameras,
     starts,
     suited_lens,
 )
-from orthoscope.fitting.observations import Observations
 from orthoscope.geometry.arrays import CalibrationError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import LENSES, Brown, KannalaBrandt, Rational
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import LENSES, Brown, KannalaBrandt, Rational
 from orthoscope.targets.detections import Detections
 
 

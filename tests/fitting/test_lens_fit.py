@@ -18,9 +18,10 @@ from orthoscope.methods.mldc.lens_about_centre import (
     parse_centred_lens,
     polynomial_of_radii,
 )
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
 from orthoscope.models.difference import frame_grid
-from orthoscope.models.lenses import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
 
 SIZE = (640, 480)
 K = Intrinsics(750.0, 740.0, 320.0, 240.0, 2.0)

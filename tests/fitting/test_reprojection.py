@@ -14,8 +14,9 @@ from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.losses import Cauchy, Huber, Linear, Loss
 from orthoscope.targets.detections import Detections

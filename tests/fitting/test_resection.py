@@ -23,8 +23,9 @@ from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, Division, Pfet
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Division, Pfet
 from orthoscope.simulation.scene import random_views
 from orthoscope.solve.losses import Cauchy
 from orthoscope.targets.detections import Detections, View

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from orthoscope.fitting import spline_values
-from orthoscope.fitting.spline_values import SplineValues
+from orthoscope.fitting.slopes import spline_values
+from orthoscope.fitting.slopes.spline_values import SplineValues
 
 
 @pytest.fixture

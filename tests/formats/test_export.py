@@ -18,10 +18,11 @@ from orthoscope.formats.load import load_camera
 from orthoscope.formats.table import FORMATS
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.decoupled.decoupled import decoupled
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
 from orthoscope.models.difference import frame_grid
-from orthoscope.models.lenses import Brown, Division, Fov, KannalaBrandt, Rational
-from orthoscope.models.opencv_order import opencv_coefficients
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.opencv_order import opencv_coefficients
+from orthoscope.models.lenses.table import Brown, Division, Fov, KannalaBrandt, Rational
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.target import chessboard
 

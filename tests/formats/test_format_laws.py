@@ -19,8 +19,9 @@ from orthoscope.formats.record import Contents
 from orthoscope.formats.syntax import Document
 from orthoscope.formats.table import FORMATS
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import FREE, Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import FREE, Brown, KannalaBrandt
 
 for_every_tool = pytest.mark.parametrize("tool", FORMATS)
 HELD = [

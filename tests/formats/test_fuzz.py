@@ -28,8 +28,9 @@ from orthoscope.formats.own.json import load, save
 from orthoscope.formats.record import Contents
 from orthoscope.formats.table import FORMATS
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.target import chessboard
 

@@ -18,10 +18,11 @@ from orthoscope.formats.own.json import load, load_calibration, load_detections,
 from orthoscope.formats.own.json_layout import lay_out
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections, Outlier, SetAside, View
 from orthoscope.targets.target import Target, chessboard

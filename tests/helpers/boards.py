@@ -8,8 +8,9 @@ import numpy as np
 from numpy import ndarray
 
 from orthoscope.fitting.calibration import Calibration, Uncertainty
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import Target, chessboard

@@ -7,8 +7,9 @@ from numpy import ndarray
 
 from orthoscope.formats.record import Format, Holding
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import FREE, LENSES
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import FREE, LENSES
 
 __all__ = ["SIZE", "camera_held", "farthest_apart", "poses", "some_pixels"]
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lens import Formula, Lens
-from orthoscope.models.lenses import (
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.lens import Formula, Lens
+from orthoscope.models.lenses.spline import Displacement, Lattice
+from orthoscope.models.lenses.table import (
     Brown,
     Division,
     DoubleSphere,
@@ -25,7 +26,6 @@ from orthoscope.models.lenses import (
     Rational,
     Stereographic,
 )
-from orthoscope.models.spline import Displacement, Lattice
 
 __all__ = [
     "FREE_LENSES_TO_TRY",

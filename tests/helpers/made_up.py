@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from orthoscope.paper.claims_about_curves import Axis
+from orthoscope.paper.claims.about_curves import Axis
 from orthoscope.paper.curves import Curve
 from orthoscope.paper.entries import MLDC, NMLDC
 from orthoscope.paper.eq7_searches import Eq7Search

@@ -11,9 +11,10 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import chessboard

@@ -7,9 +7,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.slopes.linearised import Linearised
 from orthoscope.methods.decoupled.candidates import Candidates, Model
-from orthoscope.models.lenses import FREE
+from orthoscope.models.lenses.table import FREE
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import chessboard
 

@@ -30,9 +30,10 @@ from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.methods.fccm import fccm
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import (
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import (
     LENSES,
     Brown,
     Division,

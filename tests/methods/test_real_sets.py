@@ -17,8 +17,9 @@ from orthoscope.evaluation.evaluate import evaluate
 from orthoscope.fitting.calibration import residuals_of, rms
 from orthoscope.fitting.resection import resect
 from orthoscope.methods.fccm import fccm
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import LENSES, Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import LENSES, Brown
 from orthoscope.targets.detections import Detections
 
 pytestmark = pytest.mark.datasets

@@ -8,8 +8,9 @@ from numpy.testing import assert_allclose, assert_array_less
 
 from helpers.laws import for_every_lens, rays_over
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics, image_border
-from orthoscope.models.lenses import Brown, Division, Fov, KannalaBrandt
+from orthoscope.models.camera import Camera, image_border
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Division, Fov, KannalaBrandt
 
 SIZE = (640, 480)
 INTRINSICS = Intrinsics(500.0, 510.0, 310.0, 245.0, skew=0.7)

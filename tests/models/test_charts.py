@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from orthoscope.models.charts import EQUIDISTANT, GNOMONIC, Chart
+from orthoscope.models.lenses.charts import EQUIDISTANT, GNOMONIC, Chart
 
 FOR_EVERY_CHART = pytest.mark.parametrize("chart", [GNOMONIC, EQUIDISTANT], ids=["gnomonic", "equidistant"])
 

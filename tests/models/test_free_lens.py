@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.laws import FREE_LENSES_TO_TRY, displaced, rays_over
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import FREE, Brown, KannalaBrandt, lens_name
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.table import FREE, Brown, KannalaBrandt, lens_name
 
 for_every_free_lens = pytest.mark.parametrize(
     "lens", FREE_LENSES_TO_TRY.values(), ids=FREE_LENSES_TO_TRY.keys()

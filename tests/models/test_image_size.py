@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
 from orthoscope.models.image_size import check_image_size, of_another_size
-from orthoscope.models.lenses import Brown
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 
 CAMERA = Camera((1280, 960), Intrinsics(900.0, 900.0, 640.0, 480.0), Brown())
 

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_less
 
 from helpers.laws import LENSES_TO_TRY, directions, for_every_formula, for_every_lens, places_over, rays_over
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import LENSES, Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import LENSES, Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
 
 ROUNDING = 1e-15
 
@@ -197,8 +197,20 @@ def test_a_coefficient_that_is_no_number_is_refused():
         Brown(k1=float("nan"))
 
 
+# Angles from the axis to almost straight back, radians.
+THETA = np.linspace(0.0, 3.0, 40)
+# As they come these are stereographic.
+STEREOGRAPHIC = ("stereographic", "double_sphere", "eucm")
+
+
+def test_a_stereographic_lens_is_that_by_three_formulas():
+    rays = np.stack([np.sin(THETA), 0.0 * THETA, np.cos(THETA)], axis=-1)
+    for name in STEREOGRAPHIC:
+        assert_allclose(LENSES[name]().distort(rays)[:, 0], 2.0 * np.tan(0.5 * THETA), rtol=1e-14)
+
+
 @pytest.mark.parametrize(
-    "lens", [kind() for kind in LENSES.values() if kind.__name__ not in ("Fet", "Stereographic")]
+    "lens", [kind() for name, kind in LENSES.items() if name not in ("fet", *STEREOGRAPHIC)]
 )
 def test_a_lens_without_coefficients_does_nothing(lens):
     x, y = np.array([0.0, 0.3, -0.7]), np.array([0.0, -0.2, 0.5])

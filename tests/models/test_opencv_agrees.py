@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import Brown, KannalaBrandt, Rational
 
 SIZE = (640, 480)
 INTRINSICS = Intrinsics(500.0, 510.0, 310.0, 245.0)

@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose
 from helpers.laws import for_every_lens
 from helpers.scenes import NARROW
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Lens
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.lens import Lens
 from orthoscope.models.parameters import FRAME, INTRINSICS, Parameters
 
 K = Intrinsics(520.0, 540.0, 325.0, 236.0, 12.0)

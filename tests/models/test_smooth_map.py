@@ -9,11 +9,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.laws import for_every_lens
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.spline import Displacement, Lattice
+from orthoscope.models.lenses.table import Brown
 from orthoscope.models.smooth_map import TOLERANCE_PX, smooth_map
-from orthoscope.models.spline import Displacement, Lattice
 
 SIZE = (333, 260)  # no multiple of a tile
 # px: float32 sums of numbers up to 1000 px, as tiles have that reach out of the photograph, round by 6e-5

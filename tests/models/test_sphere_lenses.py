@@ -7,7 +7,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
-from orthoscope.models.lenses import DoubleSphere, Eucm
+from orthoscope.models.lenses.table import DoubleSphere, Eucm
 
 RNG = np.random.default_rng(0)
 AHEAD = RNG.normal(size=(200, 3)) * [1.0, 1.0, 0.3] + [0.0, 0.0, 0.8]  # some are behind the image plane

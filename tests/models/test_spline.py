@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import BSpline
 
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.spline import Displacement, Lattice
+from orthoscope.models.lenses.spline import Displacement, Lattice
 
 LATTICES = {
     "square": Lattice.over(np.array([-1.0, -1.0]), np.array([1.0, 1.0]), (4, 4)),

@@ -16,9 +16,9 @@ from orthoscope.cli.paper import paper
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import InputError
 from orthoscope.methods import calibrate
+from orthoscope.paper.claims.in_figures import EXHIBITS, FIG6
 from orthoscope.paper.documents import documents
 from orthoscope.paper.entries import PAPER, PaperEntry, own_entry
-from orthoscope.paper.figures_with_claims import EXHIBITS, FIG6
 from orthoscope.paper.section4 import PARTS, Plan, run
 from orthoscope.paper.trials import Condition, simulated_trial, trial_judged
 from orthoscope.targets.detections import Detections

@@ -16,8 +16,9 @@ from click.testing import CliRunner
 from orthoscope.cli.paper import paper as paper_command
 from orthoscope.files.images import write_image
 from orthoscope.geometry.arrays import CalibrationError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.paper.documents import documents
 from orthoscope.paper.entries import MLDC, OURS, PAPER, TOLD_SETTINGS
 from orthoscope.paper.photographs import SPLIT_COUNT, obliqueness, split

@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from orthoscope.methods.mldc.mldc import mldc
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.paper.step_two import lens_from_images
 from orthoscope.paper.straightness import bent_px
 from orthoscope.paper.trials import Condition, papers_scene, simulated

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.made_up import outcome
 from orthoscope.methods import METHODS
-from orthoscope.models.lenses import LENSES
+from orthoscope.models.lenses.table import LENSES
 from orthoscope.paper.curves import curves_of
 from orthoscope.paper.entries import FCCM, FCCM5, OURS, PAPER, PaperEntry, every_lens, fair_peers
 from orthoscope.paper.trials import Condition, Trial, simulated, simulated_trial, trial_judged

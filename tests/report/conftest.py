@@ -14,8 +14,9 @@ from orthoscope.evaluation.verdict.grades import Grade
 from orthoscope.evaluation.verdict.verdict import Verdict
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty, rms
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections, SetAside, View
 from orthoscope.targets.target import Target, chessboard

@@ -16,8 +16,9 @@ from numpy.testing import assert_allclose
 from orthoscope.evaluation.misfit.misfit import misfit
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.cells import Cells, cells_for
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import LENSES, Brown, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import LENSES, Brown, KannalaBrandt
 from orthoscope.report import plates
 from orthoscope.report.data.lens_curve import along_angles
 from orthoscope.report.figures import (

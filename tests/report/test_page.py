@@ -21,8 +21,8 @@ from orthoscope.files.images import write_image
 from orthoscope.formats.own.json import load_evaluation, save
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.numbers import ABSENT
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.spline import Displacement, Lattice
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.spline import Displacement, Lattice
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.report import page as page_module
 from orthoscope.report.page import report_page, write_report

@@ -13,8 +13,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, KannalaBrandt, Rational
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt, Rational
 from orthoscope.simulation import render as rendering
 from orthoscope.simulation.render import (
     BACKGROUND_LEVEL,

@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, Division, KannalaBrandt
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Division, KannalaBrandt
 from orthoscope.simulation.scene import (
     BORDER_SHARE,
     GRAZING_ANGLE,

@@ -11,8 +11,9 @@ import pytest
 from orthoscope.files.films import frames_of as frames_worth_a_look
 from orthoscope.files.sensor_frames import mark_turned, quarter_turns
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.straight.film import CODECS, is_video, undistort_video
 from orthoscope.straight.film_av import has_pyav
 from orthoscope.straight.undistort import Straightener

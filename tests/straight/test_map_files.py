@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 from numpy.testing import assert_array_equal
 
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.straight.map_files import map_files
 from orthoscope.straight.views import map_of, straight_camera
 

@@ -11,8 +11,9 @@ from numpy.testing import assert_array_equal
 from PIL import Image, PngImagePlugin
 
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.straight.picture_files import encoded, read_picture
 from orthoscope.straight.undistort import undistort, undistort_photographs
 

@@ -14,8 +14,9 @@ from numpy.testing import assert_array_equal
 
 from orthoscope.files.images import write_image
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.straight.undistort import Straightener, undistort, undistort_photographs
 
 CAMERA = Camera((320, 240), Intrinsics(250.0, 250.0, 158.0, 121.0), Brown(k1=-0.3, k2=0.1, p1=1e-3))

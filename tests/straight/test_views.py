@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose
 
 from helpers.laws import LENSES_TO_TRY
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, Division, KannalaBrandt, Stereographic
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Division, KannalaBrandt, Stereographic
 from orthoscope.straight.undistort import Straightener, undistort
 from orthoscope.straight.views import PROJECTIONS, map_of, share_kept, straight_camera
 

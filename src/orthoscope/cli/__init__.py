@@ -13,12 +13,12 @@ from orthoscope.cli.compare import compare
 from orthoscope.cli.demo import demo
 from orthoscope.cli.detect import detect
 from orthoscope.cli.evaluate import evaluate
-from orthoscope.cli.executors import single_threaded, stopped_by_sigterm
-from orthoscope.cli.exit_codes import errors_as_exit_codes
 from orthoscope.cli.export import convert, export, tools
-from orthoscope.cli.given_files import keeping_inputs
 from orthoscope.cli.paper import paper
 from orthoscope.cli.report import report
+from orthoscope.cli.shared.executors import single_threaded, stopped_by_sigterm
+from orthoscope.cli.shared.exit_codes import errors_as_exit_codes
+from orthoscope.cli.shared.kept_inputs import keeping_inputs
 from orthoscope.cli.simulate import simulate
 from orthoscope.cli.straighten import straighten
 from orthoscope.cli.target import target

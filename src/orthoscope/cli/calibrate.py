@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell, tell_json
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell, tell_json
 
 __all__ = ["calibrate", "calibrate_into"]
 
@@ -125,15 +125,15 @@ def calibrate_into(
     as_json: bool = False,
 ) -> Any:
     """The main job; prints the summary and returns the evaluation."""
-    from orthoscope.cli.progress import bar
+    from orthoscope.cli.shared.progress import bar
 
     with bar("starting"):  # loading takes most of the first half second
-        from orthoscope.cli.executors import processes, threads
-        from orthoscope.cli.exit_codes import leave_unless_usable
-        from orthoscope.cli.inputs import detections_from
-        from orthoscope.cli.judged import EVALUATION_NAME
-        from orthoscope.cli.method_settings import settings_from
-        from orthoscope.cli.summary import evaluation_lines
+        from orthoscope.cli.shared.executors import processes, threads
+        from orthoscope.cli.shared.exit_codes import leave_unless_usable
+        from orthoscope.cli.shared.inputs import detections_from
+        from orthoscope.cli.shared.judged_calibration import EVALUATION_NAME
+        from orthoscope.cli.shared.method_settings import settings_from
+        from orthoscope.cli.shared.summary import evaluation_lines
         from orthoscope.evaluation.evaluate import evaluate
         from orthoscope.files.whole_files import check_folder
         from orthoscope.formats.own.json import save, text_of
@@ -226,8 +226,8 @@ def _write_for(tool: str, calibration: Any, out: Path) -> list[Path]:
 
 
 def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None) -> Path:
-    from orthoscope.cli.executors import threads
-    from orthoscope.cli.progress import bar
+    from orthoscope.cli.shared.executors import threads
+    from orthoscope.cli.shared.progress import bar
     from orthoscope.report.page import write_report
     from orthoscope.report.pictures import pictures_of
 

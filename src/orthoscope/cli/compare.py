@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell, tell_json
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell, tell_json
 
 if TYPE_CHECKING:
     from orthoscope.evaluation.comparison.compare import Comparison
@@ -78,9 +78,9 @@ def compare(
     as_json: bool,
 ) -> None:
     """Compare methods and lenses by their error on photographs that they have not seen."""
-    from orthoscope.cli.executors import processes, threads
-    from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.progress import bar
+    from orthoscope.cli.shared.executors import processes, threads
+    from orthoscope.cli.shared.inputs import detections_from
+    from orthoscope.cli.shared.progress import bar
     from orthoscope.evaluation.comparison.compare import compare as judge
     from orthoscope.evaluation.comparison.entry import USUAL, parse_entry
     from orthoscope.files.whole_files import check_folder, write_text

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell, tell_json
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell, tell_json
 
 __all__ = ["detect"]
 
@@ -56,9 +56,9 @@ def detect(
 
     With --target auto say which target the photographs show, and write nothing.
     """
-    from orthoscope.cli.executors import threads
-    from orthoscope.cli.inputs import AUTO, detections_from
-    from orthoscope.cli.progress import bar
+    from orthoscope.cli.shared.executors import threads
+    from orthoscope.cli.shared.inputs import AUTO, detections_from
+    from orthoscope.cli.shared.progress import bar
     from orthoscope.files.whole_files import check_folder
     from orthoscope.formats.own.json import save, text_of
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell, tell_json
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell, tell_json
 
 __all__ = ["evaluate"]
 
@@ -57,13 +57,13 @@ def evaluate(
     as_json: bool,
 ) -> None:
     """Judge a calibration: held-out error, NCE, what limits it, which photograph to take next."""
-    from orthoscope.cli.executors import threads
-    from orthoscope.cli.exit_codes import leave_unless_usable
-    from orthoscope.cli.inputs import detections_from
-    from orthoscope.cli.judged import EVALUATION_NAME, judged_calibration
-    from orthoscope.cli.on_others import json_of, lines_of, on_others
-    from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import evaluation_lines, to_json
+    from orthoscope.cli.shared.executors import threads
+    from orthoscope.cli.shared.exit_codes import leave_unless_usable
+    from orthoscope.cli.shared.inputs import detections_from
+    from orthoscope.cli.shared.judged_calibration import EVALUATION_NAME, judged_calibration
+    from orthoscope.cli.shared.on_others import json_of, lines_of, on_others
+    from orthoscope.cli.shared.progress import bar
+    from orthoscope.cli.shared.summary import evaluation_lines, to_json
     from orthoscope.fitting.calibration import Calibration
     from orthoscope.formats.load import load_source
     from orthoscope.formats.own.json import text_of

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell
 
 __all__ = ["convert", "export"]
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell
 
 __all__ = ["paper"]
 
@@ -145,10 +145,10 @@ def paper(
     out: Path,
 ) -> None:
     """Repeat the paper's experiments, all or some, each figure beside what the paper claims about it."""
-    from orthoscope.cli.executors import processes, single_threaded, threads
+    from orthoscope.cli.shared.executors import processes, single_threaded, threads
 
     with single_threaded():
-        from orthoscope.cli.progress import bar
+        from orthoscope.cli.shared.progress import bar
         from orthoscope.files.whole_files import check_folder, write_text
         from orthoscope.paper.documents import documents
         from orthoscope.paper.entries import own_entry
@@ -171,7 +171,7 @@ def paper(
         plan = (Plan.quick if quick else Plan)(seed=seed, **told)
         detections, files = None, {}
         if photos:
-            from orthoscope.cli.inputs import detections_from
+            from orthoscope.cli.shared.inputs import detections_from
 
             with threads(jobs, cluster) as executor, bar("detecting") as progress:
                 detections, files = detections_from(

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell
 
 __all__ = ["report"]
 
@@ -59,9 +59,9 @@ def report(
     figures: Path | None,
 ) -> None:
     """Write the report page of a calibration: one HTML file that needs nothing else."""
-    from orthoscope.cli.executors import threads
-    from orthoscope.cli.judged import judged_calibration
-    from orthoscope.cli.progress import bar
+    from orthoscope.cli.shared.executors import threads
+    from orthoscope.cli.shared.judged_calibration import judged_calibration
+    from orthoscope.cli.shared.progress import bar
     from orthoscope.files.images import names_of, photographs
     from orthoscope.files.whole_files import check_folder
     from orthoscope.report.page import write_report

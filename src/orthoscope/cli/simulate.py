@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell
 
 if TYPE_CHECKING:
     from orthoscope.models.camera import Camera
@@ -192,8 +192,9 @@ def _camera(
     """The camera that was asked for: of a file, of a lens, or that of the demo."""
     from orthoscope.formats.load import load_camera
     from orthoscope.geometry.arrays import InputError
-    from orthoscope.models.camera import Camera, Intrinsics
-    from orthoscope.models.lenses import lens_with_values
+    from orthoscope.models.camera import Camera
+    from orthoscope.models.intrinsics import Intrinsics
+    from orthoscope.models.lenses.table import lens_with_values
     from orthoscope.simulation.render import demo_scene
 
     if source and lens:
@@ -218,7 +219,7 @@ def write_photographs(scene: Scene, folder: Path, *, seed: int) -> Path:
     """Render every view of a scene into a folder, as PNG."""
     import numpy as np
 
-    from orthoscope.cli.progress import bar
+    from orthoscope.cli.shared.progress import bar
     from orthoscope.files.images import write_image
     from orthoscope.simulation.render import rendered_photographs
 

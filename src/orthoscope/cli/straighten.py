@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell, tell_json
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell, tell_json
 
 __all__ = ["straighten"]
 
@@ -43,16 +43,16 @@ def straighten(
     photos: tuple[str, ...], lens: str, out: Path, keep: str, jobs: int | None, as_json: bool
 ) -> None:
     """Find the lens by straight edges, without any target, and straighten the photographs."""
-    from orthoscope.cli.executors import threads
-    from orthoscope.cli.progress import bar
-    from orthoscope.cli.summary import to_json
+    from orthoscope.cli.shared.executors import threads
+    from orthoscope.cli.shared.progress import bar
+    from orthoscope.cli.shared.summary import to_json
     from orthoscope.cli.undistort import straighten as write_straight
     from orthoscope.cli.undistort import tell_of_earlier, write_beside
     from orthoscope.files.images import photographs
     from orthoscope.files.whole_files import check_folder, check_not_onto
     from orthoscope.formats.own.json import save
     from orthoscope.methods.plumb_line.photographs import lens_of_photographs
-    from orthoscope.models.lenses import lens_name
+    from orthoscope.models.lenses.table import lens_name
     from orthoscope.straight.outputs import of_earlier_runs
     from orthoscope.straight.views import straight_camera
 

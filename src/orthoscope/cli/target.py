@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from orthoscope.cli.telling import tell
+from orthoscope.cli.shared.printing import tell
 
 __all__ = ["target"]
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from orthoscope.cli import options
-from orthoscope.cli.telling import tell, tell_json
+from orthoscope.cli.shared import options
+from orthoscope.cli.shared.printing import tell, tell_json
 
 __all__ = ["straighten", "tell_of_earlier", "undistort"]
 
@@ -75,7 +75,7 @@ def undistort(
     as_json: bool,
 ) -> None:
     """Take the lens out of photographs and films: straight lines come out straight."""
-    from orthoscope.cli.summary import camera_numbers, to_json
+    from orthoscope.cli.shared.summary import camera_numbers, to_json
     from orthoscope.files.images import photographs
     from orthoscope.files.whole_files import check_folder, check_not_onto
     from orthoscope.formats.load import load_camera
@@ -152,8 +152,8 @@ def straighten_films(
     paths: list[Path], camera: Any, out: Path, *, view: Any, jobs: int | None
 ) -> dict[Path, int]:
     """Write straight films, one after the other; returns for each its number of frames."""
-    from orthoscope.cli.executors import threads
-    from orthoscope.cli.progress import bar
+    from orthoscope.cli.shared.executors import threads
+    from orthoscope.cli.shared.progress import bar
     from orthoscope.geometry.arrays import InputError
     from orthoscope.straight.film import undistort_video
     from orthoscope.straight.film_av import has_pyav
@@ -178,8 +178,8 @@ def straighten(
     paths: list[Path], camera: Any, out: Path, *, view: Any, jobs: int | None, cluster: str | None
 ) -> tuple[list[Path], list[tuple[str, str]]]:
     """Write straight pictures; photographs that cannot be used are named on stderr."""
-    from orthoscope.cli.executors import threads
-    from orthoscope.cli.progress import bar
+    from orthoscope.cli.shared.executors import threads
+    from orthoscope.cli.shared.progress import bar
     from orthoscope.geometry.arrays import InputError
     from orthoscope.straight.undistort import undistort_photographs
 

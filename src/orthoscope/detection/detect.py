@@ -17,14 +17,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.chessboard import board_size, lattice_sizes
+from orthoscope.detection.chessboards.chessboard import board_size, lattice_sizes
+from orthoscope.detection.several_targets import see_members
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.table import check_can_be_seen
-from orthoscope.detection.together import see_members
 from orthoscope.files.images import MOST_MEGAPIXELS
 from orthoscope.files.pictures import Given, Picture, pictures
 from orthoscope.geometry.arrays import CalibrationError, InputError
-from orthoscope.geometry.cores import at_once
+from orthoscope.machine.cores import at_once
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.circles import Circles
 from orthoscope.targets.detections import Detections, Remark, SetAside, View, view_name

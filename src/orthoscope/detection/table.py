@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from orthoscope.detection.aprilgrid import see_aprilgrid
-from orthoscope.detection.charuco import see_charuco
-from orthoscope.detection.chessboard import see_chessboard
-from orthoscope.detection.circles import see_circles
-from orthoscope.detection.grid_board import see_grid_board
+from orthoscope.detection.chessboards.chessboard import see_chessboard
+from orthoscope.detection.discs.circles import see_circles
+from orthoscope.detection.markers.aprilgrid import see_aprilgrid
+from orthoscope.detection.markers.charuco import see_charuco
+from orthoscope.detection.markers.grid_board import see_grid_board
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.targets.aprilgrid import AprilGrid

@@ -21,10 +21,10 @@ from orthoscope.evaluation.verdict.grades import Grade, by_error
 from orthoscope.evaluation.verdict.situation import Situation, coarse_px
 from orthoscope.evaluation.verdict.verdict import HEADS
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
+from orthoscope.fitting.slopes.image_slopes import difference_of_images, image_slopes, motion_slopes
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
-from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import rough_pixels
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.models.camera import Camera
 from orthoscope.targets.detections import Detections

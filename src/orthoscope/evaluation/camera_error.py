@@ -37,8 +37,8 @@ from orthoscope.evaluation.region import (
     ways_from,
 )
 from orthoscope.evaluation.verdict.situation import FINE_PX
-from orthoscope.fitting.image_slopes import difference_of_images, image_slopes, motion_slopes
-from orthoscope.fitting.scatter import Scatter
+from orthoscope.fitting.slopes.image_slopes import difference_of_images, image_slopes, motion_slopes
+from orthoscope.fitting.unseen.scatter import Scatter
 from orthoscope.geometry.arrays import Bool, Float, Int, evenly, median, ndarray
 from orthoscope.models.camera import Camera
 

@@ -1,7 +1,7 @@
 """Do the photographs agree on one camera?  A test of what each of them would have liked K to be.
 
 A lens that zooms or focuses between photographs, a stabiliser, a rolling shutter, two cameras in one folder:
-in each view the residuals then ask for another K.  With the fit linearised (fitting/linearised.py), C_j what
+in each view the residuals then ask for another K.  With the fit linearised (linearised.py), C_j what
 a few changes of K do to the residuals of view j, its pose fitted, B_j what its own say in the fit explains,
 s2 the noise:
 
@@ -34,8 +34,8 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.evaluation.misfit.f_distribution import f_survival
-from orthoscope.fitting.leave_one_out import hat_of
-from orthoscope.fitting.linearised import Linearised
+from orthoscope.fitting.slopes.linearised import Linearised
+from orthoscope.fitting.unseen.leave_one_out import hat_of
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference

@@ -29,12 +29,12 @@ from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.fits import Fits
-from orthoscope.fitting.held_out import USUAL_FOLDS
 from orthoscope.fitting.resection import resect
+from orthoscope.fitting.unseen.held_out import USUAL_FOLDS
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import Bool, Float, InputError, median, ndarray
-from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import with_error
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods import check_settings
 from orthoscope.methods.decoupled.fits import fits_of
 from orthoscope.models.camera import Camera

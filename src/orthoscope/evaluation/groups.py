@@ -27,15 +27,15 @@ import numpy as np
 
 from orthoscope.evaluation.disagreement import Disagreement, changes_of, disagreement, spread_of
 from orthoscope.fitting.calibration import Calibration, residuals_of
-from orthoscope.fitting.leave_one_out import LeaveOneOut, hat_of, leave_one_out
-from orthoscope.fitting.linearised import Linearised
 from orthoscope.fitting.resection import resect
+from orthoscope.fitting.slopes.linearised import Linearised
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, hat_of, leave_one_out
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.fccm import fit_flat
-from orthoscope.models.lenses import FREE
+from orthoscope.models.lenses.table import FREE
 from orthoscope.targets.detections import Detections
 
 __all__ = ["Groups", "two_groups"]

@@ -7,10 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from orthoscope.fitting.calibration import points_of
-from orthoscope.fitting.held_out import HeldOut
+from orthoscope.fitting.unseen.held_out import HeldOut
 from orthoscope.geometry.arrays import Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics
+from orthoscope.models.camera import WIDEST_ANGLE, Camera
+from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 

@@ -17,9 +17,9 @@ from orthoscope.evaluation.disagreement import Disagreement, disagreement, with_
 from orthoscope.evaluation.groups import Groups, two_groups
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.fits import Fits, RichestFit
-from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
-from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.near_copies import near_copies
+from orthoscope.fitting.slopes.linearised import Linearised
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, leave_one_out
+from orthoscope.fitting.unseen.near_copies import near_copies
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.decoupled.fits import richest_of_all
 from orthoscope.targets.detections import Detections

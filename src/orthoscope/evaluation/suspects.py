@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orthoscope.evaluation.coverage import place_of
-from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.scatter import patterns_over_views
+from orthoscope.fitting.slopes.linearised import Linearised
+from orthoscope.fitting.unseen.scatter import patterns_over_views
 from orthoscope.geometry.arrays import Float, median, ndarray
 from orthoscope.geometry.numbers import rough_pixels
 from orthoscope.targets.detections import Detections

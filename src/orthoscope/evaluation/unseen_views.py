@@ -1,9 +1,9 @@
 """The error on photographs that a camera was not made from: each left out in its turn, or in whole parts.
 
 By default each photograph is left out in its turn by one linear step from the fit that used them all
-(fitting/leave_one_out.py), which costs no fit; it agrees with refits within a few per cent
+(fitting/unseen/leave_one_out.py), which costs no fit; it agrees with refits within a few per cent
 (docs/measured/choice.md). Methods that fit pin-hole and lens one after the other have no such step: their
-photographs are dealt into folds, and the method is called again without each (fitting/held_out.py).
+photographs are dealt into folds, and the method is called again without each (fitting/unseen/held_out.py).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from orthoscope.evaluation.metrics import held_out_nce, nce_of
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.held_out import FEWEST_VIEWS, held_out, rms_and_error
+from orthoscope.fitting.unseen.held_out import FEWEST_VIEWS, held_out, rms_and_error
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods import METHODS
 

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.geometry.missing import how_to_install
+from orthoscope.machine.missing import how_to_install
 
 __all__ = ["BAGS", "pictures_in_bag"]
 

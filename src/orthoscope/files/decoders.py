@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.geometry.missing import how_to_install
+from orthoscope.machine.missing import how_to_install
 
 __all__ = ["DECODED_SUFFIXES", "RAW_SUFFIXES", "decoded"]
 

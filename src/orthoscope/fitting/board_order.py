@@ -22,7 +22,7 @@ import numpy as np
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.resection import resect
-from orthoscope.fitting.residual_slopes import residual_slopes
+from orthoscope.fitting.slopes.residual_slopes import residual_slopes
 from orthoscope.geometry.arrays import CalibrationError, Float, Int, ndarray
 from orthoscope.geometry.pose import Pose, nearest_rotation
 from orthoscope.models.camera import Camera

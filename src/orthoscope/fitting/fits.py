@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from orthoscope.fitting.leave_one_out import LeaveOneOut
-from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.scatter import Scatter
+from orthoscope.fitting.slopes.linearised import Linearised
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut
+from orthoscope.fitting.unseen.scatter import Scatter
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.targets.detections import Detections
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.models.camera import Camera
-from orthoscope.models.lens import Formula
+from orthoscope.models.lenses.lens import Formula
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss

@@ -17,7 +17,7 @@ from orthoscope.fitting.observations import Chunk, Observations, Poses
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.models.camera import Camera
-from orthoscope.models.charts import Covector
+from orthoscope.models.lenses.charts import Covector
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations
 from orthoscope.solve.losses import Loss

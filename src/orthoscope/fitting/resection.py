@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from orthoscope.fitting.calibration import points_of
-from orthoscope.fitting.closed_form import poses_of_camera
 from orthoscope.fitting.observations import Observations, Poses
 from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.fitting.starts.closed_form import poses_of_camera
 from orthoscope.geometry.arrays import CalibrationError, Float, Int, ndarray
-from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.solve.least_squares import Status, solve

@@ -13,8 +13,9 @@ from typing import Any
 
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, number, numbers, whole_number
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.opencv_order import OPENCV_ORDER
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.opencv_order import OPENCV_ORDER
 
 __all__ = ["BASALT"]
 

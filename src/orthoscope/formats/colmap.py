@@ -19,7 +19,8 @@ from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import LARGEST_SIDE, Document, numbers, whole_number
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose, quaternion_from_rotation, rotation_from_quaternion
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
 
 __all__ = ["COLMAP"]
 

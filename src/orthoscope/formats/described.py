@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from orthoscope.formats.record import Format
 from orthoscope.formats.table import FORMATS
-from orthoscope.models.lenses import FREE, LENSES
+from orthoscope.models.lenses.table import FREE, LENSES
 
 __all__ = ["table_of_tools"]
 

@@ -22,9 +22,10 @@ from orthoscope.formats.record import Contents, Format, Holding, share_beyond, s
 from orthoscope.formats.table import tool as record_of
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
 from orthoscope.models.difference import frame_grid
-from orthoscope.models.lenses import lens_name, parse_lens
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import lens_name, parse_lens
 from orthoscope.simulation.scene import Scene
 from orthoscope.solve.least_squares import Options
 

@@ -15,7 +15,7 @@ from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.ros import camera_of_matrix
 from orthoscope.formats.syntax import Document, numbers, whole_number
 from orthoscope.models.camera import Camera
-from orthoscope.models.opencv_order import OPENCV_ORDER
+from orthoscope.models.lenses.opencv_order import OPENCV_ORDER
 
 __all__ = ["FOXGLOVE"]
 

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, numbers, whole_number, yaml_list
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
 
 __all__ = ["KALIBR"]
 

@@ -26,8 +26,9 @@ import numpy as np
 
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, number
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, Pfet
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Pfet
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -19,6 +19,9 @@ from orthoscope.simulation.scene import Scene
 
 __all__ = ["format_of", "load_camera", "load_contents", "load_source"]
 
+# No pin-hole has a larger number, pixels; a file that says so is damaged.
+LARGEST_INTRINSIC = 1e9
+
 # What stands between a file's name and that of a camera in it.
 SEPARATOR = "#"
 
@@ -65,6 +68,11 @@ def load_contents(
     document = Document(path, read_bytes(path))
     record = format_of(document)
     contents = _named(record.read(document, image_size), name, document)
+    largest = max(map(abs, contents.camera.intrinsics.as_tuple()))
+    if largest > LARGEST_INTRINSIC:
+        raise document.refuse(
+            f"has {largest:g} px in its pin-hole; expected no more than {LARGEST_INTRINSIC:g}"
+        )
     return replace(contents, camera=shifted(contents.camera, -record.pixel_origin))
 
 

@@ -20,7 +20,8 @@ import numpy as np
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import LARGEST_FILE, Document, numbers, whole_number
 from orthoscope.geometry.arrays import ndarray
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
 
 __all__ = ["MATLAB"]
 

@@ -14,7 +14,8 @@ from typing import Any
 
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, number, numbers, whole_number
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
 
 __all__ = ["MESHROOM"]
 

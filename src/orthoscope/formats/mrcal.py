@@ -16,8 +16,9 @@ import numpy as np
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, numbers, whole_number
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.opencv_order import OPENCV_ORDER
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.opencv_order import OPENCV_ORDER
 
 __all__ = ["MRCAL"]
 

@@ -18,8 +18,9 @@ import numpy as np
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, matrix, number, whole_number, yaml_list
 from orthoscope.geometry.arrays import ndarray
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.opencv_order import OPENCV_ORDER
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.opencv_order import OPENCV_ORDER
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

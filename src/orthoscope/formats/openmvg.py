@@ -17,7 +17,8 @@ from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, number, numbers, whole_number
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
 
 __all__ = ["OPENMVG"]
 

@@ -17,7 +17,7 @@ from orthoscope.formats.ros import camera_of_matrix
 from orthoscope.formats.syntax import Document, matrix, whole_number
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.models.camera import Camera
-from orthoscope.models.opencv_order import OPENCV_ORDER
+from orthoscope.models.lenses.opencv_order import OPENCV_ORDER
 
 __all__ = ["PHOTONVISION"]
 

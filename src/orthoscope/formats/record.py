@@ -20,10 +20,11 @@ import numpy as np
 from orthoscope.formats.syntax import Document
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import FREE, LENSES, lens_name
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import FREE, LENSES, lens_name
 
 __all__ = ["Contents", "Files", "Format", "Holding", "share_beyond", "shifted"]
 

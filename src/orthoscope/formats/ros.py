@@ -15,8 +15,9 @@ import numpy as np
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document, matrix, whole_number, yaml_list
 from orthoscope.geometry.arrays import ndarray
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.opencv_order import OPENCV_ORDER
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.opencv_order import OPENCV_ORDER
 
 __all__ = ["ROS", "camera_of_matrix"]
 

@@ -15,7 +15,7 @@ from typing import Any, Literal, Unpack, get_origin, get_type_hints, overload
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.geometry.arrays import InputError
-from orthoscope.geometry.blas import with_one_thread
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.settings import (
     DecoupledSettings,
     FccmSettings,

@@ -18,21 +18,21 @@ import numpy as np
 from orthoscope.fitting.board_order import in_one_order
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.identifiability import check_enough, check_known, told
-from orthoscope.fitting.initial_camera import (
+from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.fitting.starts.initial_camera import (
     Assumptions,
     StartingCameras,
     starts,
     starts_elsewhere,
     suited_lens,
 )
-from orthoscope.fitting.observations import Observations
-from orthoscope.fitting.reprojection import Estimate, Reprojection
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
-from orthoscope.geometry.blas import with_one_thread
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
 from orthoscope.methods.own_centre import CENTRE_OPEN, with_own_centre
-from orthoscope.models.lenses import parse_lens
+from orthoscope.models.lenses.table import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
 from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Loss
 from orthoscope.targets.detections import Detections

@@ -1,9 +1,8 @@
-"""The pin-hole with its lens: Intrinsics, Camera, and the maps that straighten photographs.
+"""The camera: pin-hole and lens, and the maps that straighten photographs.
 
-K = [fx skew cx; 0 fy cy; 0 0 1] (the paper's A = [alpha gamma u0; 0 beta v0; 0 0 1]). A point becomes a ray,
-a place in the lens's chart, a distorted place, a pixel (docs/conventions.md). With a lens frame L the ray is
-turned by L^-1 K first and L takes the place of K at the end: the lens then acts about its own distortion
-centre.
+A point becomes a ray, a place in the lens's chart, a distorted place, a pixel (docs/conventions.md). With
+a lens frame L the ray is turned by L^-1 K first and L takes the place of K at the end: the lens then acts
+about its own distortion centre.
 """
 
 from __future__ import annotations
@@ -14,16 +13,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orthoscope.geometry.arrays import Bool, Float, InputError, frozen, ndarray
-from orthoscope.models.chunks import in_chunks
-from orthoscope.models.decentred_lenses import Brown
-from orthoscope.models.lens import Lens
-from orthoscope.models.opencv_order import opencv_distortion
+from orthoscope.geometry.arrays import Bool, Float, InputError, ndarray
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.chunks import in_chunks
+from orthoscope.models.lenses.decentred import Brown
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.opencv_order import opencv_distortion
 from orthoscope.models.parameters import Parameters
 from orthoscope.models.pixel_slopes import PixelSlopes
 from orthoscope.models.smooth_map import smooth_map
 
-__all__ = ["LARGEST_SIDE", "WIDEST_ANGLE", "Camera", "Intrinsics", "image_border"]
+__all__ = ["LARGEST_SIDE", "WIDEST_ANGLE", "Camera", "image_border"]
 
 # The lens of a camera without any.
 PIN_HOLE = Brown()
@@ -35,72 +35,8 @@ BISECTION_STEPS = 14
 GAIN_SHARE = 1e-3
 # No image has a side of more pixels; a file that says so is damaged.
 LARGEST_SIDE = 1_000_000
-# No pin-hole has a larger number, pixels; a file that says so is damaged.
-LARGEST_INTRINSIC = 1e9
 # Rays farther from the axis than this, radians, a pin-hole stretches without end.
 WIDEST_ANGLE = np.deg2rad(75.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Intrinsics:
-    """The pin-hole, pixels: u = fx x + skew y + cx, v = fy y + cy.
-
-    Raises:
-        InputError: a focal length is not positive or a number is not finite.
-    """
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    skew: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, value in zip(
-            ("fx", "fy", "cx", "cy", "skew"), frozen(self.as_tuple(), (5,), "intrinsics"), strict=True
-        ):
-            object.__setattr__(self, name, float(value))
-        if self.fx <= 0 or self.fy <= 0:
-            raise InputError(f"focal lengths are {self.fx:g} and {self.fy:g} px; expected positive ones.")
-        if max(map(abs, self.as_tuple())) > LARGEST_INTRINSIC:
-            raise InputError(f"intrinsics are {self.as_tuple()}; expected no more than 1e9 px. Mend them.")
-
-    def as_tuple(self) -> tuple[float, float, float, float, float]:
-        """(fx, fy, cx, cy, skew)."""
-        return self.fx, self.fy, self.cx, self.cy, self.skew
-
-    def after(self, undone: Intrinsics, done: Intrinsics) -> Intrinsics:
-        """The pin-hole that does what `done` does, undoes `undone` and then does this: K times undone^-1
-        times done.
-        """
-        if undone is done:
-            return self
-        (fx, skew, cx), (_, fy, cy), _ = self.matrix @ np.linalg.solve(undone.matrix, done.matrix)
-        return Intrinsics(fx, fy, cx, cy, skew)
-
-    @property
-    def matrix(self) -> Float[ndarray, "3 3"]:
-        """K (3,3)."""
-        return np.array([[self.fx, self.skew, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
-
-    def to_pixels(self, plane: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2"]:
-        """Pixels of places in the lens's plane."""
-        return np.stack(self.pixel(plane[:, 0], plane[:, 1]), axis=-1)
-
-    def to_plane(self, pixels: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2"]:
-        """Places in the lens's plane of pixels."""
-        return np.stack(self.place(pixels[:, 0], pixels[:, 1]), axis=-1)
-
-    def pixel(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:
-        """The pixel (u, v) of a place in the lens's plane."""
-        u = self.fx * x + self.cx
-        return (u + self.skew * y if self.skew else u), self.fy * y + self.cy
-
-    def place(self, u: ndarray, v: ndarray) -> tuple[ndarray, ndarray]:
-        """The place (x, y) in the lens's plane of a pixel."""
-        y = (v - self.cy) / self.fy
-        x = u - self.cx
-        return (x - self.skew * y if self.skew else x) / self.fx, y
 
 
 @dataclass(frozen=True, eq=False)

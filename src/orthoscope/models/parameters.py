@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, ndarray
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.spline import Displacement
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.spline import Displacement
 
 if TYPE_CHECKING:
-    from orthoscope.models.camera import Camera, Intrinsics
+    from orthoscope.models.camera import Camera
+    from orthoscope.models.intrinsics import Intrinsics
 
 __all__ = ["FRAME", "INTRINSICS", "Parameters"]
 

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
-from orthoscope.models.charts import Covector
-from orthoscope.models.newton_inverse import Bent
+from orthoscope.models.lenses.charts import Covector
+from orthoscope.models.lenses.newton_inverse import Bent
 from orthoscope.models.parameters import FRAME, Parameters
 
 if TYPE_CHECKING:

@@ -13,11 +13,9 @@ could, the public functions of the rooms below.
     photographs          the same on real photographs
     section4             the parts, and all of them as one list of jobs
     curves               many trials to means over a level
-    sentences            what the paper says, word for word
-    claims               what becomes of a sentence; claims_about_curves, _eq7, _steps: judged
-    wording              numbers and lists in words
+    claims/              what the paper says, word for word; what becomes of each sentence (about_curves,
+                         about_eq7, about_steps); figures and tables with theirs (in_figures, in_tables)
     first_figure         Fig. 1
-    figures_with_claims  figures with their claims; tables_with_claims: tables with theirs
     figures              NCE against noise, points, images
     page                 everything as one HTML page
     files                everything as CSV

@@ -11,20 +11,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.paper.claims import main_headline
-from orthoscope.paper.curves import curves_of
-from orthoscope.paper.entries import every_lens, with_skew
-from orthoscope.paper.figures_with_claims import (
+from orthoscope.paper.claims.claim import main_headline
+from orthoscope.paper.claims.in_figures import (
     figures_with_claims,
     on_photographs,
 )
+from orthoscope.paper.claims.in_tables import parameter_columns
+from orthoscope.paper.curves import curves_of
+from orthoscope.paper.entries import every_lens, with_skew
 from orthoscope.paper.files import curves_csv, entries_csv, members_csv, table_csv, trials_csv
 from orthoscope.paper.first_figure import first_figure
 from orthoscope.paper.page import every_claim, paper_page
 from orthoscope.paper.photographs import straightened
 from orthoscope.paper.section4 import PARTS, SCENES, Results
 from orthoscope.paper.step_two import of_step_two
-from orthoscope.paper.tables_with_claims import parameter_columns
 from orthoscope.paper.times import Timing
 
 __all__ = ["Documents", "documents"]

@@ -19,7 +19,7 @@ from orthoscope.evaluation.comparison.entry import parse_entry
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import InputError
 from orthoscope.methods import METHODS, calibrate, settings_of
-from orthoscope.models.lenses import LENSES
+from orthoscope.models.lenses.table import LENSES
 from orthoscope.targets.detections import Detections
 
 __all__ = [

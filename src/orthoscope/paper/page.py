@@ -16,10 +16,8 @@ import numpy as np
 
 from orthoscope.geometry.numbers import ABSENT, fixed, with_error
 from orthoscope.methods import METHODS
-from orthoscope.paper.claims import Claim, ClaimVerdict, main_headline, of_sentence
-from orthoscope.paper.curves import curves_of
-from orthoscope.paper.entries import PAPER
-from orthoscope.paper.figures_with_claims import (
+from orthoscope.paper.claims.claim import Claim, ClaimVerdict, main_headline, of_sentence
+from orthoscope.paper.claims.in_figures import (
     FigureWithClaims,
     eq7_claims,
     fair_finding,
@@ -27,11 +25,7 @@ from orthoscope.paper.figures_with_claims import (
     on_photographs,
     without_noise,
 )
-from orthoscope.paper.first_figure import FirstFigure
-from orthoscope.paper.photographs import SPLIT_COUNT, Straightened
-from orthoscope.paper.section4 import PAPER_NOISE_PX, SCENES, Results
-from orthoscope.paper.sentences import Sentence
-from orthoscope.paper.tables_with_claims import (
+from orthoscope.paper.claims.in_tables import (
     ParameterColumn,
     centres,
     parameter_columns,
@@ -41,6 +35,12 @@ from orthoscope.paper.tables_with_claims import (
     straightened_claims,
     time_claims,
 )
+from orthoscope.paper.claims.sentences import Sentence
+from orthoscope.paper.curves import curves_of
+from orthoscope.paper.entries import PAPER
+from orthoscope.paper.first_figure import FirstFigure
+from orthoscope.paper.photographs import SPLIT_COUNT, Straightened
+from orthoscope.paper.section4 import PAPER_NOISE_PX, SCENES, Results
 from orthoscope.paper.trials import TEST_VIEWS, TRAINING_VIEWS
 from orthoscope.report.html import raw
 from orthoscope.report.page import closed_page

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import InputError
-from orthoscope.models.lenses import LENSES
+from orthoscope.models.lenses.table import LENSES
 from orthoscope.paper.entries import PAPER, PaperEntry, every_lens, fair_peers
 from orthoscope.paper.eq7_searches import ALIKE, DAMPINGS, WEIGHTS, Eq7Search, member, rivals
 from orthoscope.paper.photographs import SPLIT_COUNT, check_views, grids_of, split_outcomes

@@ -15,7 +15,7 @@ from orthoscope.formats.table import tool as record_of
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.numbers import pixels
 from orthoscope.models.camera import Camera
-from orthoscope.models.lenses import KannalaBrandt
+from orthoscope.models.lenses.table import KannalaBrandt
 
 __all__ = ["Snippet", "snippets"]
 

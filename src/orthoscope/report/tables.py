@@ -24,8 +24,8 @@ from orthoscope.geometry.numbers import (
     with_error,
 )
 from orthoscope.models.camera import Camera
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import lens_name
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.table import lens_name
 from orthoscope.report.field_of_view import field_of_view
 
 __all__ = [

@@ -20,8 +20,9 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
 from orthoscope.geometry.pose import Pose
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.scene import Scene, random_views
 from orthoscope.simulation.sheet import Sheet
 from orthoscope.targets.target import Target, chessboard

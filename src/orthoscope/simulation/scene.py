@@ -19,8 +19,9 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, InputError, ndarray
 from orthoscope.geometry.pose import Pose, cross_matrix, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.targets.detections import Detections, SetAside, View
 from orthoscope.targets.target import Target, chessboard
 

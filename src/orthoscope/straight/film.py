@@ -22,7 +22,7 @@ import cv2
 from orthoscope.files.sensor_frames import mark_turned, open_film, quarter_turns
 from orthoscope.files.whole_files import check_not_onto
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.geometry.cores import at_once
+from orthoscope.machine.cores import at_once
 from orthoscope.models.camera import Camera
 from orthoscope.straight.film_av import has_pyav, straighten_film
 from orthoscope.straight.undistort import Straightener

@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, InputError, ndarray
-from orthoscope.models.camera import WIDEST_ANGLE, Camera, Intrinsics, image_border
-from orthoscope.models.lenses import Brown, KannalaBrandt, Stereographic
+from orthoscope.models.camera import WIDEST_ANGLE, Camera, image_border
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, KannalaBrandt, Stereographic
 from orthoscope.models.smooth_map import smooth_map
 
 __all__ = ["PROJECTIONS", "Panorama", "View", "map_of", "share_kept", "straight_camera"]

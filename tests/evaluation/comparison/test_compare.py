@@ -21,7 +21,7 @@ from orthoscope.evaluation.comparison.compare import Comparison, Standing, compa
 from orthoscope.evaluation.comparison.conclusions import as_good_as_best, conclusions
 from orthoscope.evaluation.comparison.entry import USUAL, Entry, camera_entry, parse_entry
 from orthoscope.evaluation.evaluate import evaluate
-from orthoscope.fitting.held_out import held_out, rms_and_error
+from orthoscope.fitting.unseen.held_out import held_out, rms_and_error
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods import METHODS

@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 from helpers.boards import BOARD, NARROW, WIDE, seen_by_the_truth
 from orthoscope.evaluation.misfit.jacobian import parameters_of, slopes_of, stepped
 from orthoscope.geometry.pose import Pose, rotation_from_vector
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.models.target_shape import TargetShape
 
 OWN_FRAME = Camera(

@@ -34,7 +34,7 @@ from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
-from orthoscope.models.lenses import KannalaBrandt
+from orthoscope.models.lenses.table import KannalaBrandt
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import View
 from orthoscope.targets.target import chessboard

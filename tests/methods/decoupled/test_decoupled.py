@@ -32,8 +32,8 @@ from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods.decoupled.decoupled import BASES, decoupled
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import Brown, Division
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.table import Brown, Division
 from orthoscope.models.target_shape import SHAPES as KINDS
 from orthoscope.models.target_shape import without_similarity
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections

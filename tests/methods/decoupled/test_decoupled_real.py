@@ -13,8 +13,8 @@ import pytest
 
 from helpers.real_sets import babel_cube, classic
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
-from orthoscope.fitting.held_out import held_out
 from orthoscope.fitting.resection import resect
+from orthoscope.fitting.unseen.held_out import held_out
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.target_shape import TargetShape

@@ -16,8 +16,8 @@ from orthoscope.methods.decoupled import evidence, step_one
 from orthoscope.methods.decoupled.evidence import LEAST_SHARE, Evidence, first_guess
 from orthoscope.methods.decoupled.step_one import FORMULA, StepOneFit, fit_step_one
 from orthoscope.methods.fccm import fccm
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import FREE
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.table import FREE
 from orthoscope.models.target_shape import polynomials
 from orthoscope.targets.detections import Detections
 

@@ -11,10 +11,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from helpers.bent_boards import bowed, photographed_with
 from helpers.scenes import NARROW
 from orthoscope.fitting.calibration import residuals_of
-from orthoscope.fitting.leave_one_out import hat_of, leave_one_out
-from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.near_copies import near_copies, summed_over
 from orthoscope.fitting.resection import resect
+from orthoscope.fitting.slopes.linearised import Linearised
+from orthoscope.fitting.unseen.leave_one_out import hat_of, leave_one_out
+from orthoscope.fitting.unseen.near_copies import near_copies, summed_over
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.fccm import fccm
@@ -115,7 +115,7 @@ def test_views_looked_at_together_or_in_parts_say_the_same(
     known = fit[1]
     rows = np.random.default_rng(2).standard_normal((*known.residual.shape, 2)) * (known.root > 0)[..., None]
     together = hat_of(known, rows)
-    monkeypatch.setattr("orthoscope.fitting.leave_one_out.VIEWS_AT_ONCE", 3)
+    monkeypatch.setattr("orthoscope.fitting.unseen.leave_one_out.VIEWS_AT_ONCE", 3)
     assert_allclose(hat_of(known, rows), together, rtol=1e-9, atol=1e-9)
 
 

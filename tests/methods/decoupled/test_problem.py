@@ -17,8 +17,8 @@ from orthoscope.fitting.observations import Observations
 from orthoscope.methods.decoupled.normal_equations import Measurements, spline_unknowns
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Precisions
 from orthoscope.models.camera import Camera
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import Brown, KannalaBrandt
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.models.target_shape import polynomials
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import NormalEquations, Options, solve

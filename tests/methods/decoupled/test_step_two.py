@@ -21,7 +21,7 @@ from orthoscope.methods.decoupled.step_two import (
 )
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera
-from orthoscope.models.lenses import FREE, LENSES, Brown, Division, KannalaBrandt
+from orthoscope.models.lenses.table import FREE, LENSES, Brown, Division, KannalaBrandt
 
 BOWED = photographed_with(bowed(1e-3), NARROW, 10)
 

@@ -17,11 +17,11 @@ from helpers.quick import first_quick
 from helpers.scenes import NARROW, K, camera_with, photographed, some_corners
 from orthoscope.evaluation.evaluate import evaluate_on
 from orthoscope.fitting.calibration import residuals_of, rms
-from orthoscope.fitting.held_out import held_out
-from orthoscope.fitting.initial_camera import Assumptions, StartingCameras
 from orthoscope.fitting.observations import Observations, Poses
-from orthoscope.fitting.pinhole import pinhole_start
 from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.fitting.starts.initial_camera import Assumptions, StartingCameras
+from orthoscope.fitting.starts.pinhole import pinhole_start
+from orthoscope.fitting.unseen.held_out import held_out
 from orthoscope.geometry.arrays import InputError
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods import METHODS
@@ -31,9 +31,9 @@ from orthoscope.methods.mldc.lens_about_centre import fit_centred_lens
 from orthoscope.methods.mldc.mldc import mldc
 from orthoscope.methods.mldc.nmldc import nmldc
 from orthoscope.methods.mldc.pairs import pairs_of
-from orthoscope.models.camera import Intrinsics
 from orthoscope.models.difference import image_difference
-from orthoscope.models.lenses import Brown
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
 from orthoscope.paper.subgrids import on_subgrid
 from orthoscope.simulation.scene import paper_scene, simulate_detections
 from orthoscope.solve.least_squares import solve

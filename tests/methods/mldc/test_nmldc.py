@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from helpers.scenes import BOARD as SMALL
 from helpers.scenes import NARROW, WIDE, photographed, seen, some_corners
 from orthoscope.evaluation.evaluate import evaluate_on
-from orthoscope.fitting.held_out import held_out
 from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.unseen.held_out import held_out
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.methods import METHODS
 from orthoscope.methods.fccm import fccm
@@ -21,9 +21,10 @@ from orthoscope.methods.mldc.line_residuals import Straightness
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.methods.mldc.nmldc import nmldc
 from orthoscope.methods.mldc.straightened_lines import StraightenedLines
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
-from orthoscope.models.lenses import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Division, Fet, Fov, KannalaBrandt, Pfet, Rational
 from orthoscope.paper.trials import Condition, simulated
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections
 from orthoscope.solve.least_squares import solve

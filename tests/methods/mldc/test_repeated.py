@@ -18,9 +18,10 @@ from orthoscope.methods.fccm import fccm
 from orthoscope.methods.mldc.mldc import mldc
 from orthoscope.methods.mldc.repeated import Ended
 from orthoscope.methods.own_centre import with_own_centre
-from orthoscope.models.camera import Camera, Intrinsics
+from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
-from orthoscope.models.lenses import Brown, Pfet
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Pfet
 from orthoscope.paper.trials import Condition, simulated
 from orthoscope.solve.least_squares import Options
 from orthoscope.solve.losses import Linear

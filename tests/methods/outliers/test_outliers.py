@@ -16,7 +16,7 @@ from orthoscope.methods.fccm import fccm
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
-from orthoscope.models.lenses import Rational
+from orthoscope.models.lenses.table import Rational
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections, SetAside, View
 from orthoscope.targets.target import Target, chessboard

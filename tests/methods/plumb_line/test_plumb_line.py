@@ -17,7 +17,7 @@ from orthoscope.methods.plumb_line.division import division_of_edges
 from orthoscope.methods.plumb_line.edges import Edge, edges_of
 from orthoscope.methods.plumb_line.photographs import lens_of_photographs
 from orthoscope.methods.plumb_line.plumb_line import lens_of_edges
-from orthoscope.models.lenses import Brown, Division
+from orthoscope.models.lenses.table import Brown, Division
 
 SIZE = (640, 480)
 BARREL = Brown(k1=-0.28, k2=0.08)

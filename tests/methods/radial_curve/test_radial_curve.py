@@ -14,8 +14,9 @@ from orthoscope.methods import calibrate
 from orthoscope.methods.radial_curve.curve import curve_of_views
 from orthoscope.methods.radial_curve.fitzgibbon import division_of_grids
 from orthoscope.methods.radial_curve.radial_lines import centre_of_distortion, grid_views
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lenses import Brown, Division
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown, Division
 from orthoscope.paper.trials import Condition, simulated
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections, View

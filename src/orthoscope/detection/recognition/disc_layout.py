@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from orthoscope.detection.copies import resized
-from orthoscope.detection.disc_lattice import diameter_in_steps, numbered
-from orthoscope.detection.disc_outlines import refined_discs, spots
+from orthoscope.detection.discs.disc_lattice import diameter_in_steps, numbered
+from orthoscope.detection.discs.disc_outlines import refined_discs, spots
+from orthoscope.detection.small_copies import resized
 from orthoscope.geometry.arrays import Int, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.board import Board

@@ -18,9 +18,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.detection.copies import resized
-from orthoscope.detection.marker_corners import crossings_of_sides
-from orthoscope.detection.markers import Markers, homography_of
+from orthoscope.detection.markers.marker_corners import crossings_of_sides
+from orthoscope.detection.markers.markers import Markers, homography_of
+from orthoscope.detection.small_copies import resized
 from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
 from orthoscope.targets.aprilgrid import BORDER_SQUARES, DICTIONARY, AprilGrid
 from orthoscope.targets.board import Board

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.detection.chessboard import board_size, lattice_sizes
+from orthoscope.detection.chessboards.chessboard import board_size, lattice_sizes
 from orthoscope.detection.recognition.disc_layout import disc_boards
 from orthoscope.detection.recognition.marker_layout import marker_alone, marker_boards
 from orthoscope.detection.sight import Sight

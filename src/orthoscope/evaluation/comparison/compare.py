@@ -24,16 +24,22 @@ from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalis
 from orthoscope.evaluation.same_board import same_board
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.disc_centres import has_outlines
-from orthoscope.fitting.held_out import FEWEST_VIEWS, USUAL_FOLDS, folds_of_views, held_out, rms_and_error
 from orthoscope.fitting.resection import resect
+from orthoscope.fitting.unseen.held_out import (
+    FEWEST_VIEWS,
+    USUAL_FOLDS,
+    folds_of_views,
+    held_out,
+    rms_and_error,
+)
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
-from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.numbers import with_error
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods import METHODS, calibrate
 from orthoscope.methods.outliers.outliers import without_outliers
 from orthoscope.models.camera import Camera
 from orthoscope.models.image_size import of_another_size
-from orthoscope.models.lenses import lens_name
+from orthoscope.models.lenses.table import lens_name
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 

@@ -14,7 +14,7 @@ from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import InputError
 from orthoscope.methods import METHODS
 from orthoscope.models.camera import Camera
-from orthoscope.models.lenses import parse_lens
+from orthoscope.models.lenses.table import parse_lens
 
 __all__ = ["AS_IT_IS", "USUAL", "Entry", "camera_entry", "parse_entry"]
 

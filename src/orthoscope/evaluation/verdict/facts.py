@@ -15,9 +15,9 @@ from orthoscope.evaluation.reference_fit import ReferenceFit
 from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
 from orthoscope.evaluation.verdict.situation import Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.near_copies import near_copies
+from orthoscope.fitting.unseen.near_copies import near_copies
 from orthoscope.geometry.arrays import median
-from orthoscope.models.lenses import lens_name
+from orthoscope.models.lenses.table import lens_name
 from orthoscope.solve.least_squares import Status
 
 __all__ = ["Findings", "corners_beyond", "situation_of"]

@@ -22,7 +22,7 @@ from orthoscope.evaluation.suspects import ViewError
 from orthoscope.evaluation.verdict.situation import Situation
 from orthoscope.evaluation.verdict.verdict import verdict_on
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.held_out import USUAL_FOLDS
+from orthoscope.fitting.unseen.held_out import USUAL_FOLDS
 from orthoscope.formats.own.schema import CameraFile
 from orthoscope.formats.own.struct import FileStruct, Number, Record, array_of, null_for_nan, rows_of
 from orthoscope.geometry.arrays import InputError

@@ -20,11 +20,12 @@ from orthoscope.formats.own.struct import FileStruct
 from orthoscope.geometry.arrays import InputError, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods import check_settings
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import LENSES
-from orthoscope.models.spline import Displacement, Lattice
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.spline import Displacement, Lattice
+from orthoscope.models.lenses.table import LENSES
 from orthoscope.models.target_shape import TargetShape
 from orthoscope.simulation.scene import Scene
 from orthoscope.targets.board import Board

@@ -10,7 +10,7 @@ from pathlib import Path
 from orthoscope.formats.own.json import camera_in, text_of
 from orthoscope.formats.record import Contents, Files, Format, Holding
 from orthoscope.formats.syntax import Document
-from orthoscope.models.lenses import FREE, LENSES
+from orthoscope.models.lenses.table import FREE, LENSES
 
 __all__ = ["ORTHOSCOPE"]
 

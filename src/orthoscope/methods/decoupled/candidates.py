@@ -3,7 +3,7 @@
 A model is a base formula, a shape of the target, a lens of step 1 and, where a formula is wanted, how it is
 fitted: jointly (it is then the base itself, alone) or from the pairs of step 1.  What models share is fitted
 once: the flat start of a base, step 1 for every formula from its pairs.  Each is judged by leaving one view
-out after the other, by one linear step (fitting/leave_one_out.py): the order of the views cannot matter, and
+out after the other, by one linear step (leave_one_out.py): the order of the views cannot matter, and
 no photograph is foreseen by so few others that another choice would have been right for them.
 """
 
@@ -14,10 +14,10 @@ from functools import cache, lru_cache
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.leave_one_out import LeaveOneOut, leave_one_out
-from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.near_copies import near_copies
-from orthoscope.fitting.scatter import Scatter, scatter_of
+from orthoscope.fitting.slopes.linearised import Linearised
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, leave_one_out
+from orthoscope.fitting.unseen.near_copies import near_copies
+from orthoscope.fitting.unseen.scatter import Scatter, scatter_of
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.fitters import Fitter, Kept
 from orthoscope.methods.decoupled.model import JOINT, PAIRS, Model

@@ -23,10 +23,10 @@ import numpy as np
 
 from orthoscope.fitting.board_order import in_one_order
 from orthoscope.fitting.calibration import Calibration, Candidate, Uncertainty
-from orthoscope.fitting.held_out import FEWEST_VIEWS
 from orthoscope.fitting.resection import resect
+from orthoscope.fitting.unseen.held_out import FEWEST_VIEWS
 from orthoscope.geometry.arrays import CalibrationError, InputError
-from orthoscope.geometry.blas import with_one_thread
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.decoupled.candidates import Candidates
 from orthoscope.methods.decoupled.fitters import Compared, Kept, some_of
 from orthoscope.methods.decoupled.model import JOINT, PAIRS, Model
@@ -41,7 +41,7 @@ from orthoscope.methods.decoupled.step_one import FORMULA
 from orthoscope.methods.decoupled.step_two import by_simplicity
 from orthoscope.methods.fccm import fit_flat
 from orthoscope.methods.outliers.outliers import without_outliers
-from orthoscope.models.lenses import FREE, parse_lens
+from orthoscope.models.lenses.table import FREE, parse_lens
 from orthoscope.models.target_shape import SHAPES
 from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__

@@ -8,17 +8,17 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.fits import Fits, OwnFit, RichestFit
-from orthoscope.fitting.initial_camera import formula_for
-from orthoscope.fitting.leave_one_out import leave_one_out
-from orthoscope.fitting.near_copies import near_copies
-from orthoscope.fitting.scatter import scatter_of
+from orthoscope.fitting.starts.initial_camera import formula_for
+from orthoscope.fitting.unseen.leave_one_out import leave_one_out
+from orthoscope.fitting.unseen.near_copies import near_copies
+from orthoscope.fitting.unseen.scatter import scatter_of
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.methods.decoupled.candidates import Candidates
 from orthoscope.methods.decoupled.model import PAIRS, Model
 from orthoscope.methods.decoupled.step_one_linearised import linearised_flat
 from orthoscope.methods.fccm import fit_flat
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import FREE, lens_name
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.table import FREE, lens_name
 
 __all__ = ["fits_of", "richest_of_all"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from orthoscope.models.lenses import FREE
+from orthoscope.models.lenses.table import FREE
 
 __all__ = ["JOINT", "PAIRS", "Model"]
 

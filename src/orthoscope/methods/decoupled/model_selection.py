@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orthoscope.fitting.calibration import Candidate
-from orthoscope.fitting.held_out import rms_and_error
+from orthoscope.fitting.unseen.held_out import rms_and_error
 from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["Contender", "first_as_good", "judged", "richest_unless_worse", "simplest_as_good"]

@@ -22,10 +22,11 @@ import numpy as np
 
 from orthoscope.fitting.observations import Chunk, Observations, Poses
 from orthoscope.fitting.reprojection import POSE, Estimate, Places, Reprojection
-from orthoscope.fitting.residual_slopes import by_corner, spline_values
+from orthoscope.fitting.slopes.residual_slopes import by_corner, spline_values
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.free import FreeLens
 from orthoscope.solve.losses import Linear, Loss
 
 __all__ = ["MeasurementSums", "Measurements", "spline_unknowns"]

@@ -25,9 +25,9 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements, MeasurementSums
 from orthoscope.models.camera import Camera
-from orthoscope.models.free_lens import FreeLens
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.spline import Displacement
 from orthoscope.models.parameters import Parameters
-from orthoscope.models.spline import Displacement
 from orthoscope.models.target_shape import WHOLE
 from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
 from orthoscope.solve.losses import Loss

@@ -13,8 +13,8 @@ from typing import NamedTuple
 from orthoscope.methods.decoupled.evidence import Evidence
 from orthoscope.methods.decoupled.problem import DecoupledEstimate
 from orthoscope.models.camera import Camera
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lens import Lens
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.lens import Lens
 
 __all__ = ["Start", "nearer"]
 

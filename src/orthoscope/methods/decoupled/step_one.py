@@ -21,9 +21,9 @@ from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint
 from orthoscope.methods.decoupled.start import Start, nearer
 from orthoscope.models.camera import Camera
-from orthoscope.models.free_lens import FreeLens
-from orthoscope.models.lenses import FREE
-from orthoscope.models.spline import Displacement, Lattice
+from orthoscope.models.lenses.free import FreeLens
+from orthoscope.models.lenses.spline import Displacement, Lattice
+from orthoscope.models.lenses.table import FREE
 from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
 from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Huber

@@ -1,5 +1,5 @@
 """A fit of step 1, or a full calibration of a flat target, as linear algebra, for whoever asks what its views
-say one by one (fitting/linearised.py).
+say one by one (fitting/slopes/linearised.py).
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
-from orthoscope.fitting.linearised import Linearised, SharedInverse
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.reprojection import POSE
-from orthoscope.fitting.residual_slopes import residual_slopes
+from orthoscope.fitting.slopes.linearised import Linearised, SharedInverse
+from orthoscope.fitting.slopes.residual_slopes import residual_slopes
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Precisions

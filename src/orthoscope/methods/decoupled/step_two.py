@@ -16,7 +16,7 @@ from orthoscope.fitting.lens_fit import FOCAL, about_principal_point, converted,
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.step_one import StepOneFit
 from orthoscope.models.camera import Camera
-from orthoscope.models.lenses import parse_lens
+from orthoscope.models.lenses.table import parse_lens
 from orthoscope.models.parameters import INTRINSICS, Parameters
 
 __all__ = ["by_simplicity", "formula_from_pairs", "nearest_formula", "pairs_of_step_one"]

@@ -16,11 +16,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orthoscope.fitting.leave_one_out import LeaveOneOut, scattered
-from orthoscope.fitting.linearised import Linearised
-from orthoscope.fitting.near_copies import summed_over
-from orthoscope.fitting.residual_slopes import residual_slopes
-from orthoscope.fitting.scatter import Scatter, likenesses, patterns_over_views
+from orthoscope.fitting.slopes.linearised import Linearised
+from orthoscope.fitting.slopes.residual_slopes import residual_slopes
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, scattered
+from orthoscope.fitting.unseen.near_copies import summed_over
+from orthoscope.fitting.unseen.scatter import Scatter, likenesses, patterns_over_views
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.decoupled.step_one import StepOneFit
 from orthoscope.methods.decoupled.step_one_linearised import roots_of

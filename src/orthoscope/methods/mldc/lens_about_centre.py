@@ -32,9 +32,10 @@ import numpy as np
 
 from orthoscope.fitting.lens_fit import Pairs, fit_pairs
 from orthoscope.geometry.arrays import Float, ndarray
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.lens import Formula, Lens
-from orthoscope.models.lenses import Fet, Pfet, parse_lens
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.lens import Formula, Lens
+from orthoscope.models.lenses.table import Fet, Pfet, parse_lens
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import Options, Solution, solve
 from orthoscope.solve.losses import Loss

@@ -19,16 +19,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orthoscope.fitting.identifiability import LEAST_NOISE_PX
-from orthoscope.fitting.initial_camera import FIELDS_OF_VIEW
 from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.starts.initial_camera import FIELDS_OF_VIEW
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, straightened_parameters
 from orthoscope.methods.mldc.line_residuals import Straightness
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.methods.mldc.straightened_lines import StraightenedLines, by_lens
-from orthoscope.models.camera import Camera, Intrinsics
-from orthoscope.models.charts import EQUIDISTANT
-from orthoscope.models.lens import Formula
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.charts import EQUIDISTANT
+from orthoscope.models.lenses.lens import Formula
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import Options, Solution, shared_covariance, solve
 from orthoscope.solve.losses import Cauchy, Linear, Loss

@@ -35,13 +35,13 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Uncertainty
 from orthoscope.fitting.identifiability import check_known, told
-from orthoscope.fitting.initial_camera import Assumptions, StartingCameras
 from orthoscope.fitting.observations import Observations
-from orthoscope.fitting.pinhole import fit_pinhole, pinhole_start
 from orthoscope.fitting.reprojection import Estimate
+from orthoscope.fitting.starts.initial_camera import Assumptions, StartingCameras
+from orthoscope.fitting.starts.pinhole import fit_pinhole, pinhole_start
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, InputError
-from orthoscope.geometry.blas import with_one_thread
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.fccm import fccm
 from orthoscope.methods.mldc.eq7 import Eq7
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, fit_centred_lens

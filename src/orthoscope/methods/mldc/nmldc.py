@@ -22,18 +22,18 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Uncertainty, residuals_of
 from orthoscope.fitting.identifiability import check_known, told
-from orthoscope.fitting.initial_camera import Assumptions, StartingCameras
 from orthoscope.fitting.observations import Observations
-from orthoscope.fitting.pinhole import fit_pinhole
 from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.fitting.starts.initial_camera import Assumptions, StartingCameras
+from orthoscope.fitting.starts.pinhole import fit_pinhole
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, Float, InputError, ndarray
-from orthoscope.geometry.blas import with_one_thread
 from orthoscope.geometry.pose import Pose
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
 from orthoscope.methods.mldc.lens_from_lines import MEASURES, StraightLens, fit_straight_lens
 from orthoscope.models.camera import WIDEST_ANGLE, Camera
-from orthoscope.models.lenses import lens_name
+from orthoscope.models.lenses.table import lens_name
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, shared_covariance
 from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Linear
 from orthoscope.targets.detections import Detections, View

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from orthoscope.fitting.initial_camera import StartingCameras
 from orthoscope.fitting.observations import Poses
+from orthoscope.fitting.starts.initial_camera import StartingCameras
 from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["pairs_of"]

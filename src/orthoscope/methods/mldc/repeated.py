@@ -29,10 +29,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from orthoscope.fitting.initial_camera import StartingCameras
 from orthoscope.fitting.lens_fit import FOCAL
 from orthoscope.fitting.observations import Poses
 from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.fitting.starts.initial_camera import StartingCameras
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import (
     CENTRE,
@@ -44,8 +44,8 @@ from orthoscope.methods.mldc.lens_about_centre import (
 )
 from orthoscope.methods.mldc.pairs import pairs_of
 from orthoscope.models.camera import Camera, image_border
-from orthoscope.models.lens import Lens
-from orthoscope.models.lenses import Fet, Pfet
+from orthoscope.models.lenses.lens import Lens
+from orthoscope.models.lenses.table import Fet, Pfet
 from orthoscope.models.parameters import Parameters
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss

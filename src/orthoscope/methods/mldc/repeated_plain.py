@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.fitting.initial_camera import StartingCameras
 from orthoscope.fitting.reprojection import Estimate, Reprojection
+from orthoscope.fitting.starts.initial_camera import StartingCameras
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.methods.mldc.lens_about_centre import (
     fit_centred_lens,
@@ -25,7 +25,7 @@ from orthoscope.methods.mldc.lens_about_centre import (
     refit_centred_lens,
 )
 from orthoscope.methods.mldc.pairs import pairs_of
-from orthoscope.models.lenses import Brown
+from orthoscope.models.lenses.table import Brown
 from orthoscope.solve.least_squares import Options, Status, solve
 from orthoscope.solve.losses import Loss
 

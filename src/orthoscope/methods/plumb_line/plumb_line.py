@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.geometry.arrays import CalibrationError, Float, Int, ndarray
-from orthoscope.geometry.blas import with_one_thread
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, parse_centred_lens
 from orthoscope.methods.mldc.lens_from_lines import StraightLens, lens_of_lines
 from orthoscope.methods.mldc.line_residuals import Straightness

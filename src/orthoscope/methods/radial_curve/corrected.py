@@ -13,9 +13,9 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Calibration, Uncertainty
 from orthoscope.fitting.identifiability import check_known
-from orthoscope.fitting.initial_camera import Assumptions, StartingCameras
 from orthoscope.fitting.observations import Observations
-from orthoscope.fitting.pinhole import fit_pinhole
+from orthoscope.fitting.starts.initial_camera import Assumptions, StartingCameras
+from orthoscope.fitting.starts.pinhole import fit_pinhole
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import fit_centred_lens
 from orthoscope.methods.mldc.pairs import pairs_of

@@ -20,7 +20,7 @@ import numpy as np
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.usable_views import with_usable_views
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
-from orthoscope.geometry.blas import with_one_thread
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.radial_curve.corrected import calibration_of_corrected
 from orthoscope.methods.radial_curve.radial_lines import GridView, grid_views
 from orthoscope.targets.detections import Detections

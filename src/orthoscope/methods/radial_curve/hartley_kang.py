@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.usable_views import with_usable_views
-from orthoscope.geometry.blas import with_one_thread
+from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.radial_curve.corrected import calibration_of_corrected
 from orthoscope.methods.radial_curve.curve import curve_of_views
 from orthoscope.methods.radial_curve.radial_lines import centre_of_distortion, grid_views

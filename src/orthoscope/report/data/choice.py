@@ -9,7 +9,7 @@ import numpy as np
 from orthoscope.evaluation.evaluate import Evaluation
 from orthoscope.fitting.calibration import Candidate
 from orthoscope.geometry.numbers import with_error
-from orthoscope.models.lenses import FREE
+from orthoscope.models.lenses.table import FREE
 
 __all__ = ["choice", "model_name"]
 

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
-from orthoscope.models.charts import GNOMONIC
 from orthoscope.models.difference import image_difference
+from orthoscope.models.lenses.charts import GNOMONIC
 from orthoscope.report.data.frame_fields import ideal_image
 from orthoscope.report.data.lens_curve import along_angles, angles_shown, marks
 from orthoscope.report.figures.style import (

@@ -1,0 +1,1 @@
+"""What verbs share: options, inputs, workers, progress, what is printed, how a verb leaves."""

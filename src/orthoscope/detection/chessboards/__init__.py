@@ -1,0 +1,1 @@
+"""Chessboards: from corners of four squares to lattices, and which part of which board they are."""

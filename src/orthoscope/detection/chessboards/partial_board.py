@@ -1,0 +1,366 @@
+"""Which part of a chessboard a lattice of corners is: its corners' ids, as far as the board determines them.
+
+The lattice is laid out as a grid (rows, columns) whose gaps are filled from their neighbours, and cleared of
+corners that are none: where the four squares around are not bright and dark by turns as everywhere else. At
+each of its four sides it then either *goes on* (the next line has such corners too: it is taken in), or
+*ends* (the
+squares beyond the last corners are there, and behind them white paper: this is the board's own side), or
+neither
+can be seen: the picture stops there, a hand is in the way. A placement of the lattice on the board is a
+quarter turn and a shift; it stands if black squares come to lie on black ones, if sides that end are the
+board's sides, and if nothing reaches over them. One placement, or several that are the same but for the
+board's own symmetry, give the ids; more than one leave them open.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from orthoscope.detection.chessboards.grid import grid_shape, one_line_more, steps_of
+from orthoscope.detection.chessboards.lattices import CornerLattice
+from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
+
+__all__ = [
+    "Grid",
+    "alternating",
+    "filled",
+    "grid_of",
+    "has_plain_squares",
+    "is_even",
+    "laid_out",
+    "placements",
+]
+
+# A corner strays from the parabolas of its row and column by at most this share of a step.
+FARTHEST_STRAY_SHARE = 0.3
+# Strays are taken out at most so many times, those nearly as far off as the worst together.
+CLEARING_ROUNDS = 12
+# Beyond this share of the worst stray a corner is nearly as far off.
+NEARLY_WORST_SHARE = 0.8
+# At least this share of the corners is left when strays are taken out; with fewer it was a lattice by chance.
+LEAST_LEFT_SHARE = 0.5
+# A corner has more than this share of the usual strength of one.
+LEAST_CONTRAST_SHARE = 0.3
+# A line goes on where at least this share of its corners that are in the picture stands out.
+GOING_ON_SHARE = 0.6
+# The board ends where this share of a line's squares alternates, with white behind them.
+BLANK_SQUARES_SHARE = 0.75
+# A line at the rim with fewer than three corners, and less than this share of the next line's, is chance.
+THIN_LINE_SHARE = 0.34
+# Where squares are looked at, as shares of their sides.
+PLACES_IN_SQUARE = (0.3, 0.5, 0.7)
+# The place with the least contrast of bright to dark squares has at least this share of the greatest.
+LEAST_PLAIN_SHARE = 0.37
+# So many lines more are needed for the shape of those.
+SHAPING_LINES = 2
+# The usual difference of corners' strengths from their median is less than this share of it on a board.
+MOST_UNEVENNESS = 0.45
+# A line is compared with so many lines before it.
+COMPARED_LINES = 4
+# In the four squares around a corner the grey is looked at so far from their sides, squares.
+STEPS_INTO_SQUARE = (0.15, 0.25, 0.35)
+# Weights (3, 36) of the corner, its step along the row and its step along the column: nine places in each of
+# the four squares, those of one colour first.
+PLACES_IN_SQUARES = np.array(
+    [
+        (1.0, across * step, up * other)
+        for across, up in ((1, 1), (-1, -1), (1, -1), (-1, 1))
+        for step in STEPS_INTO_SQUARE
+        for other in STEPS_INTO_SQUARE
+    ]
+).T
+
+
+class Grid(NamedTuple):
+    """A lattice as a grid.
+
+    Attributes:
+        corners: (rows, columns, 2) pixels, gaps filled.
+        seen: (rows, columns) whether a corner was seen there.
+        bright: whether the square between +column and +row of the first corner is the bright one.
+        ends: whether the board ends at the first row, the last column, the last row, the first column.
+    """
+
+    corners: Float[ndarray, "r c 2"]
+    seen: Bool[ndarray, "r c"]
+    bright: bool
+    ends: tuple[bool, bool, bool, bool]
+
+
+def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
+    """The grid of a lattice, cleared, filled and taken as far as it goes; None where nothing is left of it.
+
+    Args:
+        grey: (h,w) uint8, the picture in which the lattice was found.
+        found: the lattice.
+        most: lines that are added at most.
+    """
+    kept = _without_strays(found)
+    if kept is None:
+        return None
+    columns, rows = kept.size
+    corners = np.full((rows, columns, 2), np.nan)
+    corners[kept.cells[:, 1], kept.cells[:, 0]] = kept.pixels
+    first = int(np.abs(kept.cells).sum(1).argmin())
+    bright = bool(kept.bright[first]) ^ bool(kept.cells[first].sum() % 2)
+    seen = np.isfinite(corners[..., 0])
+    seen &= _stands(grey, filled(corners), bright)
+    corners[~seen] = np.nan
+    box = _box(seen)
+    if box is None:
+        return None
+    bright ^= bool((box[0].start + box[1].start) % 2)
+    grid, seen = filled(corners[box]), seen[box]
+    seen |= _stands(grey, grid, bright)
+    return _taken_further(grey, grid, seen, bright, most)
+
+
+def placements(grid: Grid, columns: int, rows: int, *, negative: bool = False) -> list[Int[ndarray, "r c"]]:
+    """Ids (rows, columns) of the grid's corners, seen or not, for each way it can lie on a board.
+
+    Args:
+        grid: the lattice.
+        columns: inner corners of the board.
+        rows: likewise.
+        negative: whether to take white for black.
+    """
+    as_said, inverted = [], []
+    for quarters in range(4):
+        seen = np.rot90(grid.seen, quarters)
+        height, width = seen.shape
+        if width > columns or height > rows:
+            continue
+        top, right, bottom, left = np.roll(grid.ends, -quarters)
+        # the first corner of the turned grid, and whether bright lies between its own +column and +row
+        sum_of_first = np.rot90(np.add.outer(*(np.arange(side) for side in grid.seen.shape)), quarters)[0, 0]
+        bright = grid.bright ^ bool(sum_of_first % 2) ^ bool(quarters % 2)
+        for row in range(rows - height + 1):
+            for column in range(columns - width + 1):
+                dark = (row + column) % 2 == 0  # between +column and +row of such corners
+                if (top and row) or (left and column):
+                    continue
+                if (bottom and row + height < rows) or (right and column + width < columns):
+                    continue
+                ids = np.add.outer((np.arange(height) + row) * columns, np.arange(width) + column)
+                (inverted if dark == bright else as_said).append(np.rot90(ids, -quarters))
+    if negative:
+        return inverted
+    if (columns + rows) % 2 or (columns == rows and columns % 2):  # white for black is the board turned
+        return as_said
+    whole = grid.seen.size == columns * rows
+    return (as_said or inverted) if whole else [*as_said, *inverted]
+
+
+def grid_of(grey: ndarray, corners: Float[ndarray, "r c 2"], most: int) -> Grid:
+    """The grid of corners that some finder returned, taken as far as it goes."""
+    bright = bool(alternating(grey, corners).sum() > 0)
+    return _taken_further(grey, corners, np.ones(corners.shape[:2], dtype=bool), bright, most)
+
+
+def filled(grid: Float[ndarray, "r c 2"], *, rounds: int = 1000) -> Float[ndarray, "r c 2"]:
+    """The grid with its gaps filled: each from those of its neighbours whose lines foresee it, near ones
+    first.
+    """
+    grid = grid.copy()
+    for _ in range(rounds):
+        if not np.isnan(grid[..., 0]).any():
+            break
+        told = _foreseen(grid)
+        known = np.isfinite(told[..., 0])
+        count = known.sum(0)
+        new = np.isnan(grid[..., 0]) & (count > 0)
+        if not new.any():
+            return np.where(np.isnan(grid), -1e4, grid)  # far outside: nothing foresees it
+        total = np.where(known[..., None], told, 0.0).sum(0)
+        grid[new] = (total / np.maximum(count, 1)[..., None])[new]
+    return grid
+
+
+def _foreseen(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "12 r c 2"]:
+    """Each place from the two before it on its line, the two beside it, and three of a parallelogram, from
+    all four sides.
+    """
+    rows, columns = grid.shape[:2]
+    around = np.full((rows + 4, columns + 4, 2), np.nan)
+    around[2:-2, 2:-2] = grid
+
+    def at(down: int, along: int) -> ndarray:
+        return around[2 + down : 2 + down + rows, 2 + along : 2 + along + columns]
+
+    told = np.empty((12, *grid.shape))
+    for i, (down, along) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+        beside = (along, -down)
+        told[i] = 2.0 * at(down, along) - at(2 * down, 2 * along)
+        told[4 + i] = at(down, along) + at(*beside) - at(down + beside[0], along + beside[1])
+        told[8 + i] = 0.5 * (at(down, along) + at(-down, -along))
+    return told
+
+
+def _without_strays(found: CornerLattice) -> CornerLattice | None:
+    """The lattice without corners that are off their neighbours' lines, the worst first."""
+    pixels, cells, bright = found
+    for _ in range(CLEARING_ROUNDS):
+        if len(pixels) < max(4, LEAST_LEFT_SHARE * len(found.pixels)):
+            return None
+        stray = grid_shape(pixels, cells.astype(float)).stray
+        if stray.max() <= FARTHEST_STRAY_SHARE:
+            break
+        keep = stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())
+        pixels, cells, bright = pixels[keep], cells[keep], bright[keep]
+    cells = cells - cells.min(0)
+    return CornerLattice(pixels, cells, bright)
+
+
+def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:
+    """Where the squares around a corner are bright and dark as they must be there, with contrast enough."""
+    strength = alternating(grey, grid) * (1.0 if bright else -1.0)
+    usual = median(strength[strength > 0]) if (strength > 0).any() else np.inf
+    return strength > LEAST_CONTRAST_SHARE * usual
+
+
+def _box(seen: Bool[ndarray, "r c"]) -> tuple[slice, slice] | None:
+    """Rows and columns with corners, thin lines at the rim left out."""
+    top, bottom, left, right = 0, seen.shape[0], 0, seen.shape[1]
+    while bottom - top >= 2 and right - left >= 2:
+        part = seen[top:bottom, left:right]
+        lines = [
+            (part[0], part[1]),
+            (part[-1], part[-2]),
+            (part[:, 0], part[:, 1]),
+            (part[:, -1], part[:, -2]),
+        ]
+        thin = [
+            line.sum() == 0 or (line.sum() < 3 and line.sum() < THIN_LINE_SHARE * next_.sum())
+            for line, next_ in lines
+        ]
+        if not any(thin):
+            return slice(top, bottom), slice(left, right)
+        top, bottom, left, right = top + thin[0], bottom - thin[1], left + thin[2], right - thin[3]
+    return None
+
+
+def _taken_further(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool, most: int) -> Grid:
+    """The grid with the lines beyond its sides, as long as they go on; and which of its sides end."""
+    ends = []
+    for _ in range(4):  # the last row in turn, by turning the grid
+        for _ in range(most):
+            if len(grid) < 2:
+                break
+            more = (
+                one_line_more(grid) if len(grid) > 2 else np.concatenate([grid, 2 * grid[-1:] - grid[-2:-1]])
+            )
+            stands = _next_line_stands(grey, more, bright)
+            if not stands.any() or stands.sum() < GOING_ON_SHARE * _in_picture(grey, more[-1]).sum():
+                break
+            grid, seen = more, np.concatenate([seen, stands[None]])
+        ends.append(_ends(grey, grid))
+        grid, seen = np.rot90(grid), np.rot90(seen)  # what was the last column is now the first row
+        bright = bright ^ bool((grid.shape[0] - 1) % 2) ^ True
+    # np.rot90 brings the right side to the top, so the last row in turn was: bottom, left, top, right
+    bottom, left, top, right = ends
+    return Grid(grid, seen, bright, (top, right, bottom, left))
+
+
+def is_even(grey: ndarray, grid: Grid) -> bool:
+    """Whether a grid's corners are about as strong as each other; those of texture are not."""
+    strength = alternating(grey, grid.corners)[grid.seen] * (1.0 if grid.bright else -1.0)
+    usual = median(strength) if len(strength) else 0.0
+    return usual > 0 and median(np.abs(strength - usual)) < MOST_UNEVENNESS * usual
+
+
+def has_plain_squares(grey: ndarray, grid: Grid) -> bool:
+    """Whether a grid's squares are bright and dark by turns all over, in the mean of each of nine places in
+    them.
+
+    Where a board is seen small and slanted a lattice may link every other corner, or middles of squares: its
+    own squares are then parts of several.
+    """
+    corners = grid.corners
+    rows, columns = grid.seen.shape[0] - 1, grid.seen.shape[1] - 1
+    bright = (np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0) == grid.bright
+    if bright.all() or not bright.any():
+        return True
+    u, v = (part.reshape(-1, 1, 1, 1) for part in np.meshgrid(PLACES_IN_SQUARE, PLACES_IN_SQUARE))
+    places = (1 - v) * ((1 - u) * corners[:-1, :-1] + u * corners[:-1, 1:])
+    places += v * ((1 - u) * corners[1:, :-1] + u * corners[1:, 1:])
+    low = np.maximum(np.floor(places.reshape(-1, 2).min(0)) - 4, 0).astype(int)
+    high = np.maximum(np.ceil(places.reshape(-1, 2).max(0)) + 5, low + 1).astype(int)
+    part = cv2.GaussianBlur(grey[low[1] : high[1], low[0] : high[0]], (0, 0), 1.0)
+    if not part.size:
+        return False
+    x, y = (places - low).reshape(len(places), -1, 2).astype(np.float32).transpose(2, 0, 1)
+    values = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
+    contrast = values[:, bright.ravel()].mean(1) - values[:, ~bright.ravel()].mean(1)
+    return bool(contrast.min() > LEAST_PLAIN_SHARE * contrast.max())
+
+
+def _next_line_stands(grey: ndarray, more: ndarray, bright: bool) -> ndarray:
+    """Which corners of the last row are the board's, as those of the rows before it are."""
+    first = max(0, len(more) - 1 - COMPARED_LINES - SHAPING_LINES) // 2 * 2  # even, for the signs
+    strength = alternating(grey, more[first:])[-1 - COMPARED_LINES :] * (1.0 if bright else -1.0)
+    before = strength[:-1]
+    usual = median(before[before > 0]) if (before > 0).any() else np.inf
+    return strength[-1] > 0.5 * usual
+
+
+def _ends(grey: ndarray, grid: ndarray) -> bool:
+    """Whether the board ends behind the last row: one more row of squares, then white paper."""
+    if len(grid) < 2:
+        return False
+    last, step = grid[-1], grid[-1] - grid[-2]
+    middle, out = 0.5 * (last[1:] + last[:-1]), 0.5 * (step[1:] + step[:-1])
+    places = np.stack([middle + share * out for share in (-0.5, 0.5, 0.75, 1.3)])  # (4, columns - 1, 2)
+    inside = _in_picture(grey, places).all(0)
+    if inside.sum() < max(2, 0.5 * len(middle)):
+        return False
+    x, y = np.clip(np.rint(places).astype(int), 0, np.array(grey.shape[::-1]) - 1)[:, inside].transpose(
+        2, 0, 1
+    )
+    before, near, far, beyond = grey[y, x].astype(float)
+    level = 0.5 * (before + near)  # one of the two squares is bright, the other dark
+    contrast = 0.25 * np.abs(near - before)
+    dark = near < before
+    same = np.abs(far - near) < 2.0 * contrast
+    alternates = np.abs(near - before) > 0.5 * median(np.abs(near - before))
+    paper = beyond > level  # behind the bright ones too: where the board goes on, there are dark squares
+    if dark.all() or not dark.any():
+        return False
+    ends = min((same & alternates).mean(), paper[dark].mean(), paper[~dark].mean())
+    return bool(ends >= BLANK_SQUARES_SHARE)
+
+
+def _in_picture(grey: ndarray, places: ndarray) -> ndarray:
+    return np.all((places >= 0) & (places <= np.array(grey.shape[::-1]) - 1), axis=-1)
+
+
+def alternating(grey: ndarray, grid: ndarray) -> Float[ndarray, "r c"]:
+    """How much brighter the square between +column and +row and its opposite are than the two others, grey
+    levels, every other corner's sign turned: a board has one sign throughout. 0 where they are not two and
+    two.
+    """
+    rows, columns = grid.shape[:2]
+    strength = strengths(grey, grid)
+    return strength * np.where(np.add.outer(np.arange(rows), np.arange(columns)) % 2, -1.0, 1.0)
+
+
+def strengths(grey: ndarray, grid: ndarray) -> Float[ndarray, "r c"]:
+    """How much brighter the square between +column and +row and its opposite are than the two others, grey
+    levels.
+
+    Negative where they are darker; 0 where the four squares are not two and two, or one of them is not in the
+    picture.
+    """
+    rows, columns = grid.shape[:2]
+    along, down = steps_of(grid)
+    at = np.stack([grid, along, down]).reshape(3, -1, 2).transpose(2, 1, 0) @ PLACES_IN_SQUARES  # (2, m, 36)
+    height, width = grey.shape
+    x, y = np.rint(np.clip(at, -9e5, 9e5)).astype(int)
+    inside = ((x >= 0) & (x < width) & (y >= 0) & (y < height)).all(1)
+    seen = grey.ravel().take(y * width + x, mode="clip")
+    one, two, three, four = seen.reshape(len(seen), 4, -1).mean(-1).T  # the first two are of one colour
+    bright = np.minimum(one, two) - np.maximum(three, four)
+    dark = np.minimum(three, four) - np.maximum(one, two)
+    return np.where(inside, np.maximum(bright, 0.0) - np.maximum(dark, 0.0), 0.0).reshape(rows, columns)

@@ -1,0 +1,1 @@
+"""Discs: their outlines, their centres and how they lie."""

@@ -1,0 +1,1 @@
+"""Corners where four squares meet, to a fraction of a pixel."""

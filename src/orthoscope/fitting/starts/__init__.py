@@ -1,0 +1,1 @@
+"""Where a fit starts: closed forms, and a camera and poses near enough."""

@@ -1,0 +1,1 @@
+"""Lenses: what one is, the formulas, the free one, their inverses and where they end."""
