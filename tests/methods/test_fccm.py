@@ -62,6 +62,8 @@ NOT_RECOVERED = {
     "pfet with a ring": "its centre is torn to a ring: no board can be seen whole",
     "fet pincushion": "its scale is negative, and fits start among fish-eyes",
     "fov strong": "six times coarser at 78 degrees than at its centre: no base camera comes near",
+    "double_sphere no distortion": "there xi, alpha and the focal length do the same to the image",
+    "double_sphere mild": "another xi and alpha make the same image to a thousandth of a pixel",
 }
 
 

@@ -63,6 +63,9 @@ TOO_MANY_RATIO = 1.5
 FLOOR_RATIO = 6
 # A corner that is off its neighbours' lines is sought again so many times.
 REPAIR_ROUNDS = 2
+# A corner of whose window the saddle explains less than of others is kept where it lies no farther from where
+# all others foresee it, pixels.
+FORESEEN_PX = 0.4
 # A corner is off its neighbours' lines by at least so many steps, and so many times the usual stray.
 OFF_LIMITS = (0.1, 6.0)
 # A corner that is no saddle is off by at least so many steps, and so many times the usual stray.
@@ -257,6 +260,7 @@ def _refined(
             np.where(off, again.believed, fine.believed),
             np.where(off, again.explained, fine.explained),
             np.where(off, again.sure, fine.sure),
+            np.where(off, again.whole, fine.whole),
         )
         off = _off(fine, places)
     fine, off = _on_smooth_grid(grey, fine, places, off, arms[row, column])
@@ -268,7 +272,7 @@ def _refined(
     pixels = corners.copy()
     pixels[row, column] = fine.pixels
     sure = np.zeros_like(seen)
-    sure[row, column] = fine.sure
+    sure[row, column] = fine.sure & fine.whole
     return pixels, good, sure
 
 
@@ -280,7 +284,7 @@ def _on_smooth_grid(
     arms: Float[ndarray, " m"],
 ) -> tuple[Refined, Bool[ndarray, " m"]]:
     """The corners, those that are off where all others foresee them sought again from there; and which stay
-    off.
+    off. What lies where it is foreseen is whole, though something may cover a part of its window.
     """
     on = np.flatnonzero(~off)
     if not len(on):
@@ -290,16 +294,19 @@ def _on_smooth_grid(
     away, foreseen, limit = off_smooth_grid(
         fine.pixels[on], places[on], step, doubtful=~fine.believed[on], poor=poor
     )
+    whole = fine.whole.copy()
+    whole[on] |= np.hypot(*(fine.pixels[on] - foreseen).T) < FORESEEN_PX
+    fine = fine._replace(whole=whole)
     if not away.any():
         return fine, off
     pixels, believed, sure, off = fine.pixels.copy(), fine.believed.copy(), fine.sure.copy(), off.copy()
     pixels[on[away]] = foreseen[away]
     again = refined(grey, pixels[on], places[on], approach=False, arm=arms[on])
     pixels[on[away]], believed[on[away]] = again.pixels[away], again.believed[away]
-    sure[on[away]] = again.sure[away]
+    sure[on[away]], whole[on[away]] = again.sure[away], again.whole[away]
     moved = np.hypot(*(again.pixels - foreseen).T)
     off[on[away]] = ((moved > limit) | ~again.believed)[away]
-    return Refined(pixels, believed, fine.explained, sure), off
+    return Refined(pixels, believed, fine.explained, sure, whole), off
 
 
 def _without_strays(

@@ -83,7 +83,7 @@ def _fitted(
     gap = nearest_neighbour(corners, places)
     good = fine.believed & (grid_shape(fine.pixels, places).stray < MOST_STRAY_SHARE)
     good &= np.hypot(*(fine.pixels - corners).T) < FARTHEST_SHARE * np.maximum(gap, LEAST_GAP_PX)
-    return ids[good], fine.pixels[good], fine.sure[good]
+    return ids[good], fine.pixels[good], (fine.sure & fine.whole)[good]
 
 
 def _next_to(

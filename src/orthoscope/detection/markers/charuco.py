@@ -113,7 +113,7 @@ def _grown(
         grid, good = np.full_like(grid, np.nan), np.zeros_like(good)
         grid[row[fits], column[fits]] = fine.pixels[fits]
         good[row[fits], column[fits]] = True
-        sure[row, column] = fits & fine.sure
+        sure[row, column] = fits & fine.sure & fine.whole
         if good.sum() < FEWEST_CORNERS:
             break
         start = filled(grid, rounds=1)

@@ -48,7 +48,7 @@ WIDEST_SPREAD = 0.19
 WIDEST_TURN = 0.4
 # A sure corner has more than this share of the usual contrast.
 LEAST_CONTRAST_SHARE = 0.35
-# Of a sure corner's window the saddle leaves at most so much more than of most, as a share of its variance
+# Of a whole corner's window the saddle leaves at most so much more than of most, as a share of its variance
 # and, with that, of the share that is noise.
 MOST_UNEXPLAINED, MOST_UNEXPLAINED_NOISE = 0.03, 0.3
 # Where a marker reaches into the window, whose blur is in it, so much more.
@@ -67,12 +67,15 @@ class Refined(NamedTuple):
         believed: whether a saddle was fitted; else cornerSubPix had the last word.
         explained: share of its window's variance that the saddle explains.
         sure: whether the saddle says to well within a pixel where the corner is, and is like the others'.
+        whole: whether it is as true to the picture as most: where something covers a part of a window, it is
+            explained less.
     """
 
     pixels: Float[ndarray, "m 2"]
     believed: Bool[ndarray, " m"]
     explained: Float[ndarray, " m"]
     sure: Bool[ndarray, " m"]
+    whole: Bool[ndarray, " m"]
 
 
 def refined(
@@ -121,20 +124,15 @@ def refined(
     if not (sure & (_turn(saddles, shape) < WIDEST_TURN)).all():  # what is off was perhaps not near yet
         shape = grid_shape(saddles.places, places)
     most_left = np.where(arms < 1.0, MOST_UNEXPLAINED_BY_MARKS, MOST_UNEXPLAINED)
-    sure &= _are_alike(saddles, shape, noise_share, most_left)
-    return Refined(pixels, believed, saddles.explained, sure)
-
-
-def _are_alike(
-    saddles: Saddles, shape: GridShape, noise_share: Float[ndarray, " m"], most_left: Float[ndarray, " m"]
-) -> Bool[ndarray, " m"]:
-    """Which saddles have edges along the lattice's lines, about as much contrast as most, and are as true to
-    the picture as most: where something covers a part of a window, it is explained less.
-    """
-    contrast = np.abs(saddles.contrast)
     left = 1.0 - saddles.explained - noise_share
-    true = left - median(left) < most_left + MOST_UNEXPLAINED_NOISE * noise_share
-    return true & (_turn(saddles, shape) < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * median(contrast))
+    whole = left - median(left) < most_left + MOST_UNEXPLAINED_NOISE * noise_share
+    return Refined(pixels, believed, saddles.explained, sure & _are_alike(saddles, shape), whole)
+
+
+def _are_alike(saddles: Saddles, shape: GridShape) -> Bool[ndarray, " m"]:
+    """Which saddles have edges along the lattice's lines, and about as much contrast as most."""
+    contrast = np.abs(saddles.contrast)
+    return (_turn(saddles, shape) < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * median(contrast))
 
 
 def _turn(saddles: Saddles, shape: GridShape) -> Float[ndarray, " m"]:

@@ -65,7 +65,7 @@ class DoubleSphere(_ThroughASurface):
     """
 
     free: ClassVar[tuple[str, ...]] = ("xi", "alpha")
-    starts = ({"xi": -0.2}, {"xi": 0.2})
+    starts = ({"xi": -0.2}, {"xi": 0.2}, {"alpha": 0.1})
     several_minima: ClassVar[bool] = True  # one on either side of the sphere
 
     xi: float = 0.0
