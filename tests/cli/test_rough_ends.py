@@ -138,6 +138,7 @@ def corners(scene, tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_another_programs_camera_has_a_verdict_on_photographs(run, scene, corners, tmp_path):
     for focal, verdict in (
         (1.0, "Good: the camera that these photographs give by themselves"),

@@ -97,6 +97,7 @@ def test_a_tool_that_is_not_known_is_refused_before_any_work(calibrate, method):
     assert not (out / "calibration.json").exists()
 
 
+@pytest.mark.slow
 def test_the_export_verb_says_what_a_formula_instead_of_the_free_lens_costs(run, calibrate, tmp_path):
     _, out = calibrate("--shape", "flat", "--lens", "free")
     told = run("export", out / "calibration.json", "--to", "ros", "-o", tmp_path / "camera.yaml")

@@ -206,7 +206,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 SOME = ("--only", "fig4", "--points", "3x4,4x5")
 
 
-@pytest.mark.parametrize("some", [SOME, pytest.param((), marks=pytest.mark.slow)], ids=["some", "all"])
+@pytest.mark.slow
+@pytest.mark.parametrize("some", [SOME, ()], ids=["some", "all"])
 def test_one_process_and_two_give_the_same_bytes_and_say_how_to_get_the_rest(tmp_path, some):
     for jobs in (1, 2):
         told = paper("--quick", "--trials", 1, *some, "--jobs", jobs, "-o", tmp_path / str(jobs))

@@ -66,6 +66,7 @@ def test_repeated_ends_at_the_joint_minimum_in_few_rounds(scene, nce):
     assert evaluate_on(fccm(training, lens="brown:k1,k2").camera, test).nce > 4 * nce
 
 
+@pytest.mark.slow
 def test_the_straight_image_has_the_photographs_scale_at_the_centre_for_every_lens():
     """Or the normalised error, which is in units of fx, would go with a convention of the formula."""
     training, test = simulated("low", Condition(subgrid=(6, 9)), seed=0, trial=0)

@@ -23,13 +23,8 @@ SIZE = (640, 480)
 BARREL = Brown(k1=-0.28, k2=0.08)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        name if name == "strong barrel" else pytest.param(name, marks=pytest.mark.slow)
-        for name in STREET_LENSES
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STREET_LENSES)
 def test_three_streets_tell_the_lens_within_a_pixel_over_the_frame(name):
     lens, focal = STREET_LENSES[name]
     truth = street_camera(lens, focal=focal)
