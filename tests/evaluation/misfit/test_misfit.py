@@ -27,8 +27,8 @@ from helpers.boards import (
 )
 from helpers.quick import first_quick
 from helpers.real_sets import classic
-from orthoscope.evaluation.misfit.f_test import is_misfit
 from orthoscope.evaluation.misfit.misfit import Misfit, misfit
+from orthoscope.evaluation.verdict.causes import is_misfit
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm

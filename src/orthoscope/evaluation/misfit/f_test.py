@@ -17,16 +17,8 @@ from orthoscope.evaluation.misfit.f_distribution import f_survival
 from orthoscope.evaluation.misfit.whitening import FAINT_SHARE, Whitening
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["Agreement", "MisfitTest", "agreement", "is_misfit"]
+__all__ = ["Agreement", "MisfitTest", "agreement"]
 
-# With this p-value of a misfit one perfect set in a hundred is blamed for its target, and one for its lens.
-SURE_P_VALUE = 0.01
-# The p-value over views is at most this or, with too few views to get there, the least that they can give.
-SURE_P_VALUE_OVER_VIEWS = 0.05
-# A misfit that is smaller than this share of the noise adds less than a thirtieth to the error.
-TELLING_SHARE = 0.25
-# No misfit that is smaller, pixels, matters to anyone.
-NEGLIGIBLE_MISFIT_PX = 0.01
 # With fewer views "the same in all views" means nothing.
 FEWEST_AGREEING_VIEWS = 3
 # At least so many degrees of freedom are left for the noise.
@@ -58,14 +50,6 @@ class MisfitTest:
     p_over_views: float
     systematic_px: float
     noise_px: float
-
-
-def is_misfit(test: MisfitTest, views: int) -> bool:
-    """Whether a misfit is certain, by the F test and by the vote of the views, and large enough to matter."""
-    certain = test.p_value < SURE_P_VALUE and test.p_over_views <= max(
-        SURE_P_VALUE_OVER_VIEWS, 2.0 ** (1 - views)
-    )
-    return certain and test.systematic_px > max(TELLING_SHARE * test.noise_px, NEGLIGIBLE_MISFIT_PX)
 
 
 class Agreement(NamedTuple):

@@ -11,11 +11,12 @@ from collections.abc import Callable, Sequence
 from math import isnan
 from typing import NamedTuple
 
+from orthoscope.evaluation.misfit.f_test import MisfitTest
 from orthoscope.evaluation.verdict.grades import WIDE_SHARE, Grade, good_somewhere
 from orthoscope.evaluation.verdict.situation import FINE_PX, Situation
 from orthoscope.geometry.numbers import rough_pixels
 
-__all__ = ["CAUSES", "FEW_VIEWS", "Cause", "listed"]
+__all__ = ["CAUSES", "FEW_VIEWS", "Cause", "is_misfit", "listed"]
 
 # With fewer photographs no error can be told.
 FEWEST_PHOTOGRAPHS = 4
@@ -29,6 +30,14 @@ NOTICED_SHARE = 1.0
 LARGE_SHARE = 0.5
 # Cameras that differ by less, pixels, are one camera for everyone.
 NEGLIGIBLE_DIFFERENCE_PX = 0.05
+# With this p-value of a misfit one perfect set in a hundred is blamed for its target, and one for its lens.
+SURE_P_VALUE = 0.01
+# The p-value over views is at most this or, with too few views to get there, the least that they can give.
+SURE_P_VALUE_OVER_VIEWS = 0.05
+# A misfit that is smaller than this share of the noise adds less than a thirtieth to the error.
+TELLING_SHARE = 0.25
+# No misfit that is smaller, pixels, matters to anyone.
+NEGLIGIBLE_MISFIT_PX = 0.01
 # A free lens may miss up to this share of the corners' noise.
 STIFF_SHARE = 0.5
 # What a formula misses, where it is a smaller share of the camera's error, limits nothing.
@@ -58,6 +67,14 @@ class Cause(NamedTuple):
     holds: Callable[[Situation], bool]
     allows: Callable[[Situation], Grade]
     says: Callable[[Situation], str]
+
+
+def is_misfit(test: MisfitTest, views: int) -> bool:
+    """Whether a misfit is certain, by the F test and by the vote of the views, and large enough to matter."""
+    certain = test.p_value < SURE_P_VALUE and test.p_over_views <= max(
+        SURE_P_VALUE_OVER_VIEWS, 2.0 ** (1 - views)
+    )
+    return certain and test.systematic_px > max(TELLING_SHARE * test.noise_px, NEGLIGIBLE_MISFIT_PX)
 
 
 def listed(images: Sequence[str]) -> str:
@@ -177,7 +194,7 @@ CAUSES: tuple[Cause, ...] = (
     ),
     Cause(
         "target",
-        lambda s: s.target_px > 0.0,  # where misfit/f_test.py takes it for one
+        lambda s: s.target_px > 0.0,  # where it is a misfit
         _as_far_as_it_goes,
         lambda s: f"{_target(s)}: in every photograph its corners are off by the same {s.target_mm:.2g} mm",
     ),

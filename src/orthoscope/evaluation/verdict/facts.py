@@ -9,10 +9,10 @@ import numpy as np
 from orthoscope.evaluation.coverage import emptiest_place
 from orthoscope.evaluation.disagreement import AGREED, Disagreement
 from orthoscope.evaluation.groups import Groups
-from orthoscope.evaluation.misfit.f_test import is_misfit
 from orthoscope.evaluation.misfit.misfit import Misfit
 from orthoscope.evaluation.reference_fit import ReferenceFit
 from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
+from orthoscope.evaluation.verdict.causes import is_misfit
 from orthoscope.evaluation.verdict.situation import Situation, coarse_px
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.unseen.near_copies import near_copies
