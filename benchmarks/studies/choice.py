@@ -29,7 +29,7 @@ from orthoscope.evaluation.camera_error import predicted_error, rms_difference, 
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.decoupled.candidates import Candidates, Model
-from orthoscope.methods.decoupled.decoupled import BASES
+from orthoscope.methods.decoupled.model import BASES
 from orthoscope.methods.decoupled.model_selection import (
     Contender,
     first_as_good,

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from orthoscope.cli.shared import options
-from orthoscope.cli.shared.printing import tell, tell_json
+from orthoscope.cli.shared.printing import tell, tell_json, tell_of_earlier
 
 __all__ = ["calibrate", "calibrate_into"]
 
@@ -190,8 +190,6 @@ def calibrate_into(
 
 def _tell_of_others(out: Path, written: list[Path]) -> None:
     """Say what earlier calibrations wrote into the folder that this one did not write anew."""
-    from orthoscope.cli.undistort import tell_of_earlier
-
     there = [path for pattern in ON_REQUEST for path in sorted(out.glob(pattern)) if path.is_file()]
     tell_of_earlier([path for path in there if path not in written])
 
@@ -240,7 +238,7 @@ def _write_report(evaluation: Any, files: dict[str, Path], out: Path, *, keep: s
 def _write_straight(
     evaluation: Any, files: dict[str, Path], out: Path, *, keep: str, jobs: int | None, cluster: str | None
 ) -> Path:
-    from orthoscope.cli.undistort import straighten, straighten_films, tell_of_earlier, write_beside
+    from orthoscope.cli.undistort import straighten, straighten_films, write_beside
     from orthoscope.files.pictures import MOVING
     from orthoscope.geometry.arrays import InputError
     from orthoscope.straight.film import is_video

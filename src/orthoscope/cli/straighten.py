@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from orthoscope.cli.shared import options
-from orthoscope.cli.shared.printing import tell, tell_json
+from orthoscope.cli.shared.printing import tell, tell_json, tell_of_earlier
 
 __all__ = ["straighten"]
 
@@ -47,7 +47,7 @@ def straighten(
     from orthoscope.cli.shared.progress import bar
     from orthoscope.cli.shared.summary import to_json
     from orthoscope.cli.undistort import straighten as write_straight
-    from orthoscope.cli.undistort import tell_of_earlier, write_beside
+    from orthoscope.cli.undistort import write_beside
     from orthoscope.files.images import photographs
     from orthoscope.files.whole_files import check_folder, check_not_onto
     from orthoscope.formats.own.json import save

@@ -8,12 +8,9 @@ from typing import Any
 import click
 
 from orthoscope.cli.shared import options
-from orthoscope.cli.shared.printing import tell, tell_json
+from orthoscope.cli.shared.printing import tell, tell_json, tell_of_earlier
 
-__all__ = ["straighten", "tell_of_earlier", "undistort"]
-
-# So many files of earlier runs are named.
-LISTED_FILES = 5
+__all__ = ["straighten", "undistort"]
 
 EXAMPLE = """\b
 Examples:
@@ -116,18 +113,6 @@ def undistort(
     )
     others += [str(path) for path in beside[wrote_camera:]]
     tell(f"wrote      {'; '.join(made)}" + "".join(f", and {other}" for other in others))
-
-
-def tell_of_earlier(files: list[Path]) -> None:
-    """Say which files in the folder are of earlier runs, and so of the camera that was used then.
-
-    Args:
-        files: these.
-    """
-    if files:
-        listed = ", ".join(path.name for path in files[:LISTED_FILES])
-        more = f" and {len(files) - LISTED_FILES} more" if len(files) > LISTED_FILES else ""
-        tell(f"kept       of earlier runs, whose camera may be another: {listed}{more}", err=True)
 
 
 def write_beside(camera: Any, view: Any, out: Path, *, maps: str | None) -> list[Path]:

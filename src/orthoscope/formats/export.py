@@ -77,7 +77,8 @@ class Exported(NamedTuple):
         """What one must know of the file, a sentence each; none where it is the camera itself."""
         held, told = self.held, []
         holding = self.tool.holding(held.camera.lens)
-        if holding and holding.note:
+        assert holding is not None, "the camera is one that the tool holds"
+        if holding.note:
             told.append(f"{lens_name(held.camera.lens)}: {holding.note}")
         if held.lacks:
             told.append(
@@ -85,8 +86,6 @@ class Exported(NamedTuple):
                 f" {held.apart_px:.2g} px apart on average {held.where}, {held.farthest_px:.2g} px at most"
             )
         if held.beyond > 0:
-            holding = self.tool.holding(held.camera.lens)
-            assert holding is not None, "the camera is one that the tool holds"
             told.append(
                 f"{100 * held.beyond:.2g} % of the frame looks farther than {holding.farthest_deg:g} degrees"
                 f" from the axis, where {self.tool.name} has no image or a wrong one"

@@ -51,25 +51,26 @@ def _camera(camera: dict, name: str, document: Document, image_size: tuple[int, 
     first, (fx, fy, cx, cy) = values[:own], values[own:]
     coefficients = numbers(camera.get("distortion_coeffs", []), f"distortion_coeffs of {name}", document)
     word = str(camera.get("distortion_model", "none"))
-    if model != "pinhole" and any(coefficients):
+    stretch = 1.0
+    if model == "pinhole":
+        lens = KALIBR.lens("radtan" if word == "none" else word, coefficients or [0.0] * 4, document)
+    elif any(coefficients):
         raise document.refuse(
             f"has {name} with {model} and a distortion {word[:40]!r} on top; expected none",
             f"Calibrate with {model}-none, ds-none or pinhole-equi.",
         )
-    if model == "pinhole":
-        lens = KALIBR.lens("radtan" if word == "none" else word, coefficients or [0.0] * 4, document)
     elif model == "omni":
-        stretch = 1.0 + first[0]
+        stretch += first[0]
         if stretch <= 0.0:
             raise document.refuse(f"has {name} with xi {first[0]:g}; expected more than -1")
-        lens, fx, fy = KALIBR.lens("eucm", [first[0] / stretch, 1.0], document), fx / stretch, fy / stretch
+        lens = KALIBR.lens("eucm", [first[0] / stretch, 1.0], document)
     else:
         lens = KALIBR.lens(model, first, document)
     if image_size is None:
         resolution = numbers(camera.get("resolution"), f"resolution of {name}", document, count=2)
         sides = [whole_number(side, f"resolution of {name}", document) for side in resolution]
         image_size = (sides[0], sides[1])
-    return Camera(image_size, Intrinsics(fx, fy, cx, cy), lens)
+    return Camera(image_size, Intrinsics(fx / stretch, fy / stretch, cx, cy), lens)
 
 
 def _write(contents: Contents, place: Path) -> Files:

@@ -1,1 +1,1 @@
-"""Arrays, poses, homographies, cells of a frame, numbers as text, how many things at once."""
+"""Arrays, poses, homographies, cells of a frame, numbers as text."""

@@ -29,7 +29,8 @@ from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, InputError
-from orthoscope.methods.decoupled.decoupled import BASES, decoupled
+from orthoscope.methods.decoupled.decoupled import decoupled
+from orthoscope.methods.decoupled.model import BASES
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.free import FreeLens

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 from orthoscope.files.printable import printable, printable_json
 
-__all__ = ["tell", "tell_json"]
+__all__ = ["tell", "tell_json", "tell_of_earlier"]
+
+# So many files of earlier runs are named.
+LISTED_FILES = 5
 
 
 def tell(*lines: str, err: bool = False) -> None:
@@ -23,3 +28,15 @@ def tell(*lines: str, err: bool = False) -> None:
 def tell_json(text: str) -> None:
     """Print a JSON document."""
     click.echo(printable_json(text).removesuffix("\n"))
+
+
+def tell_of_earlier(files: list[Path]) -> None:
+    """Say which files in the folder are of earlier runs, and so of the camera that was used then.
+
+    Args:
+        files: these.
+    """
+    if files:
+        listed = ", ".join(path.name for path in files[:LISTED_FILES])
+        more = f" and {len(files) - LISTED_FILES} more" if len(files) > LISTED_FILES else ""
+        tell(f"kept       of earlier runs, whose camera may be another: {listed}{more}", err=True)

@@ -18,7 +18,6 @@ __all__ = ["see_grid_board"]
 ENOUGH_SHARE = 0.9
 # A marker's corner is at most this share of its side from where OpenCV sees it.
 FARTHEST_SHARE = 0.15
-
 # Corners are compared with a smooth map of this order through all others.
 MOST_ORDER = 3
 

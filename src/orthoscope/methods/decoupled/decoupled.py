@@ -29,7 +29,7 @@ from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.decoupled.candidates import Candidates
 from orthoscope.methods.decoupled.fitters import Compared, Kept, some_of
-from orthoscope.methods.decoupled.model import JOINT, PAIRS, Model
+from orthoscope.methods.decoupled.model import BASES, JOINT, PAIRS, Model
 from orthoscope.methods.decoupled.model_selection import (
     Contender,
     first_as_good,
@@ -46,11 +46,9 @@ from orthoscope.models.target_shape import SHAPES
 from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__
 
-__all__ = ["BASES", "decoupled"]
+__all__ = ["decoupled"]
 
 AUTO = "auto"
-# These are the base formulas, in order of preference.
-BASES = ("brown", "kannala_brandt", "rational")
 TOO_FEW = (
     f"fewer than {FEWEST_VIEWS} views cannot be judged by views that were not used; where nothing else was"
     " asked for, the target is taken to be as it is said to be, and the lens to follow its formula"

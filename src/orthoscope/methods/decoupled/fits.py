@@ -14,7 +14,7 @@ from orthoscope.fitting.unseen.near_copies import near_copies
 from orthoscope.fitting.unseen.scatter import scatter_of
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.methods.decoupled.candidates import Candidates
-from orthoscope.methods.decoupled.model import PAIRS, Model
+from orthoscope.methods.decoupled.model import BASES, PAIRS, Model
 from orthoscope.methods.decoupled.step_one_linearised import linearised_flat
 from orthoscope.methods.fccm import fit_flat
 from orthoscope.models.lenses.free import FreeLens
@@ -22,8 +22,6 @@ from orthoscope.models.lenses.table import FREE, lens_name
 
 __all__ = ["fits_of", "richest_of_all"]
 
-# The richest fit has one of these bases under its free lens.
-RICHEST_BASES = ("brown", "kannala_brandt", "rational")
 # With fewer views a free lens and a free target have nothing to be told by.
 FEWEST_VIEWS = 2
 
@@ -114,7 +112,7 @@ def _base(calibration: Calibration) -> str:
         return str(base)
     lens = calibration.camera.lens
     name = lens_name(lens.base if isinstance(lens, FreeLens) else lens)
-    if name in RICHEST_BASES:
+    if name in BASES:
         return name
     pixels = np.concatenate([view.pixels for view in calibration.detections.views])
     return formula_for(calibration.camera.unproject(pixels))

@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 from orthoscope.models.lenses.table import FREE
 
-__all__ = ["JOINT", "PAIRS", "Model"]
+__all__ = ["BASES", "JOINT", "PAIRS", "Model"]
 
+# These are the base formulas under a free lens, in order of preference.
+BASES = ("brown", "kannala_brandt", "rational")
 JOINT, PAIRS = "joint", "pairs"
 
 
