@@ -12,10 +12,10 @@ from orthoscope.detection.discs.disc_lattice import (
     diameter_in_steps,
     foreseen,
     laid_on,
-    like_the_others,
     numbered,
 )
 from orthoscope.detection.discs.disc_outlines import refined_discs, spots
+from orthoscope.detection.discs.whole_discs import are_whole
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.small_copies import resized, to_photograph
 from orthoscope.geometry.arrays import Int, ndarray
@@ -82,27 +82,23 @@ def _outlined(
     scale = grey.shape[1] / copy.shape[1]
     mine = ids >= 0
     rough = Ellipses(to_photograph(discs.centres[mine], copy, grey), discs.axes[mine] * scale)
-    known, (fine, roughness) = ids[mine], refined_discs(grey, rough)
+    known, fine = ids[mine], refined_discs(grey, rough)
     unlike = known[:0]
     for _ in range(board.columns + board.rows):
-        good = np.isfinite(fine.centres[:, 0])
-        known, fine, roughness = known[good], fine.of(good), roughness[good]
-        good = like_the_others(board, fine, known, roughness)
+        good = np.isfinite(fine.ellipses.centres[:, 0])
+        known, fine = known[good], fine.of(good)
+        good = are_whole(board, fine, known)
         unlike = np.union1d(unlike, known[~good])
-        known, fine, roughness = known[good], fine.of(good), roughness[good]
+        known, fine = known[good], fine.of(good)
         if len(known) < FEWEST_DISCS:
             break
-        more, there = foreseen(board, fine, known, grey.shape)
-        added, rough_added = refined_discs(grey, there)
-        off = np.linalg.norm(added.centres - there.centres, axis=1)
+        more, there = foreseen(board, fine.ellipses, known, grey.shape)
+        added = refined_discs(grey, there)
+        off = np.linalg.norm(added.ellipses.centres - there.centres, axis=1)
         near = ~np.isin(more, unlike) & (off < FARTHEST_RADII * np.sqrt(np.abs(np.linalg.det(there.axes))))
         if not near.any():
             break
-        known = np.concatenate([known, more[near]])
-        roughness = np.concatenate([roughness, rough_added[near]])
-        fine = Ellipses(
-            np.concatenate([fine.centres, added.centres[near]]), np.concatenate([fine.axes, added.axes[near]])
-        )
+        known, fine = np.concatenate([known, more[near]]), fine.with_more(added.of(near))
     order = np.argsort(known)
-    diameter = diameter_in_steps(fine, board.neighbour_places()[known]) * board.nearest
-    return Sight(known[order], fine.centres[order], diameter=diameter)
+    diameter = diameter_in_steps(fine.ellipses, board.neighbour_places()[known]) * board.nearest
+    return Sight(known[order], fine.ellipses.centres[order], diameter=diameter)
