@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.discs.disc_fit import fit_discs
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Bool, Float, ndarray
 from orthoscope.geometry.ellipses import Ellipses, fit_ellipses
 
 __all__ = ["Outlines", "refined_discs", "spots"]
@@ -131,15 +131,17 @@ class Outlines(NamedTuple):
         ellipses: through them, NaN where there is no whole one.
         roughness: (n,) rms of an outline about its ellipse, in radii.
         contrast: (n,) from inside to outside, as a share of the outside.
+        wide: (n,) whether it is wide enough beside the blur to be fitted whole.
     """
 
     ellipses: Ellipses
     roughness: Float[ndarray, " n"]
     contrast: Float[ndarray, " n"]
+    wide: Bool[ndarray, " n"]
 
     def of(self, which: ndarray) -> Outlines:
         """Those of some."""
-        return Outlines(self.ellipses.of(which), self.roughness[which], self.contrast[which])
+        return Outlines(self.ellipses.of(which), *(part[which] for part in self[1:]))
 
     def with_more(self, more: Outlines) -> Outlines:
         """These, then more."""
@@ -180,7 +182,7 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Outlines:
         new_centres[which], new_axes[which] = found.centres[good], found.axes[good]
         roughness[which] = off_radii[good]
         fitted = Ellipses(new_centres, new_axes)
-    return _fitted_whole(grey, Outlines(fitted, roughness, contrast))
+    return _fitted_whole(grey, Outlines(fitted, roughness, contrast, np.zeros(len(roughness), dtype=bool)))
 
 
 def _fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
@@ -199,6 +201,7 @@ def _fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     centres, axes = found.centres.copy(), found.axes.copy()
     centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
     centres[which[~smooth]], axes[which[~smooth]] = np.nan, np.nan
+    outlines.wide[which[taken]] = True
     return outlines._replace(ellipses=Ellipses(centres, axes))
 
 

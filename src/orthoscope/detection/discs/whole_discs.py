@@ -31,10 +31,11 @@ MOST_ROUNDS, MOST_TIMES_USUAL = 4, 3.0
 # A disc's centre is at most so many of its radii off from where those near it foresee it, or so many times as
 # far as is usual.
 MOST_OFF_PLACE, TIMES_OFF_PLACE = 0.15, 6.0
-# One that is rough or of another size is off by at most so many times the usual, but within these, pixels.
+# One that is rough, of another size or hardly wider than the blur is off by at most so many times the usual,
+# but within these, pixels.
 SUSPECT_OFF_PX = 0.5, 0.8
-# A disc whose outline is rougher than this, radii, and than so many times the usual, or its radius off by more
-# than this share, may be covered.
+# A disc whose outline is rougher than this, radii, and than so many times the usual, or its radius off by
+# more than this share, may be covered.
 SURELY_SMOOTH, SUSPECT_ROUGH, SURELY_AS_LARGE = 0.015, 2.0, 0.03
 
 
@@ -63,8 +64,10 @@ def are_whole(board: Circles, discs: Outlines, ids: Int[ndarray, " n"]) -> Bool[
     off_place = np.hypot(off[:, 0], off[:, 1]) / radii
     off_size, off_contrast = np.abs(off[:, 2]), _off_parabola(places, np.log(discs.contrast))
     usual = TIMES_OFF_PLACE * median(off_place)
-    suspect = (roughness > max(SURELY_SMOOTH, SUSPECT_ROUGH * median(roughness))) | (
-        off_size > SURELY_AS_LARGE
+    suspect = (
+        ~discs.wide
+        | (roughness > max(SURELY_SMOOTH, SUSPECT_ROUGH * median(roughness)))
+        | (off_size > SURELY_AS_LARGE)
     )
     low, high = (px / radii for px in SUSPECT_OFF_PX)
     good &= off_place < np.where(suspect, np.clip(usual, low, high), max(MOST_OFF_PLACE, usual))
