@@ -99,6 +99,7 @@ def _outlined(
         if not near.any():
             break
         known, fine = np.concatenate([known, more[near]]), fine.with_more(added.of(near))
+        fine = refined_discs(grey, fine.ellipses)  # which leaves out what is near to another
     order = np.argsort(known)
     diameter = diameter_in_steps(fine.ellipses, board.neighbour_places()[known]) * board.nearest
     return Sight(known[order], fine.ellipses.centres[order], diameter=diameter)

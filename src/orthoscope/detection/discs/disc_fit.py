@@ -38,14 +38,16 @@ USUAL_RADIUS = 24.0
 STILL_PX, MOST_STEPS = 0.02, 8
 # With the light of all discs it has at most so many more.
 LIT_STEPS = 2
-# So many discs tell how light changes over the picture.
-FEWEST_LIT = 12
+# How light changes over the picture is a polynomial of this order, of so many discs at least; fewer do not
+# tell.
+LIGHT_ORDERS = (3, 36), (2, 20), (1, 12), (0, 6)
+FEWEST_LIT = LIGHT_ORDERS[-1][1]
 # How much light differs from that is known to no better than this share of its noise.
 LEAST_LIGHT_SHARE = 0.3
 # A step is at most this share of the shorter half axis.
 LARGEST_STEP_SHARE = 0.25
 # The blur from which all begin, and the least and most of it, pixels and shares of the shorter half axis.
-FIRST_BLUR, LEAST_BLUR, MOST_BLUR_SHARE = 1.0, 0.7, 1.0
+FIRST_BLUR, LEAST_BLUR, MOST_BLUR_SHARE = 1.0, 0.6, 1.0
 # Pixels take part up to so many blurs from the outline, and one more pixel.
 REACH_BLURS = 2.5
 # No pixel beyond so many radii takes part: there the next disc may begin.
@@ -60,6 +62,8 @@ LIKE_DISCS = 4
 USUAL_SPREAD = 0.15
 # Pixels that may take part are sought up to so many times as far from the outline as that blur reaches.
 SPARE_REACH = 1.5
+# Nearer to another disc than this, pixels, a pixel is not asked, where the blur is not known yet or wide.
+FIRST_REACH = 4.0
 # An outline has so many sectors.
 SECTORS = 12
 # So many pixels of all discs are done together.
@@ -145,7 +149,7 @@ class _Fit:
         pixels = max(min(reach, float(median(self.half))) * 2.0 * np.pi * float(median(self.half)), 1.0)
         at_once = max(1, int(PIXELS_AT_ONCE / (2.0 * pixels)))
         parts = (which[start : start + at_once] for start in range(0, len(which), at_once))
-        return [(some, _Pixels(grey, self.centres[some], self.axes[some], reach)) for some in parts]
+        return [(some, _Pixels(grey, self.centres, self.axes, some, reach)) for some in parts]
 
     def _hold_to(self, discs: Int[ndarray, " k"]) -> None:
         """From now on no disc's blur and contrast differ much from those of most of these."""
@@ -159,6 +163,7 @@ class _Fit:
         """Steps until each outline has moved by less than `STILL_PX`, or has had its steps; then with the
         light that all discs have.
         """
+        self.relief[:] = self.usual_relief
         self._settle(self.batches, MOST_STEPS)
         if len(self.centres) >= FEWEST_LIT:
             self._share_light()
@@ -178,8 +183,11 @@ class _Fit:
         """Uneven light that changes evenly over the picture, through that of all discs; and how much theirs
         differs from it beyond noise.
         """
-        places = np.column_stack([np.ones(len(self.centres)), self.centres - self.centres.mean(0)])
-        good = np.ones(len(places), dtype=bool)
+        count = len(self.centres)
+        x, y = ((self.centres - self.centres.mean(0)) / np.ptp(self.centres, axis=0).max()).T
+        order = next(order for order, fewest in LIGHT_ORDERS if count >= fewest)
+        places = np.stack([x**i * y**j for i in range(order + 1) for j in range(order + 1 - i)], axis=1)
+        good = np.ones(count, dtype=bool)
         for _ in range(2):
             self.light = places @ np.linalg.lstsq(places[good], self.seen_light[good], rcond=None)[0]
             off = np.hypot(*(self.seen_light - self.light).T)
@@ -286,22 +294,56 @@ def _left(columns: Float[ndarray, "n 11 k"], solution: Float[ndarray, "n 10"]) -
 
 
 class _Pixels:
-    """The pixels about the outlines of n discs: values less their mean, offsets (2,k) from the middle."""
+    """The pixels about the outlines of n discs: values less their mean, offsets (2,k) from the middle.
+
+    Args:
+        grey: (h,w) uint8.
+        centres, axes: of all discs.
+        some: those n.
+        reach: pixels farther from an outline are not asked, nor are those as near to that of another disc.
+    """
 
     def __init__(
-        self, grey: ndarray, centres: Float[ndarray, "n 2"], axes: Float[ndarray, "n 2 2"], distance: float
+        self,
+        grey: ndarray,
+        centres: Float[ndarray, "m 2"],
+        axes: Float[ndarray, "m 2 2"],
+        some: Int[ndarray, " n"],
+        reach: float,
     ) -> None:
         height, width = grey.shape
-        self.middle = np.clip(np.rint(centres).astype(int), 0, (width - 1, height - 1))
-        reach = int(np.ceil(OUTER_RADII * np.linalg.norm(axes, axis=2).max())) + 1
-        offsets = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1)[::-1]
-        few = axes[:: max(1, len(axes) // LIKE_DISCS)]
-        radii = np.linalg.norm(np.linalg.inv(few).astype(np.float32) @ offsets.astype(np.float32), axis=1)
-        away = np.abs(radii - 1.0) * np.hypot(*offsets) / np.maximum(radii, 1e-6)
-        near = ((radii < OUTER_RADII + 0.1) & (away < distance)).any(0)
-        self.offsets = offsets[:, near].astype(np.float32)
-        column, row = self.middle.T[:, :, None] + offsets[:, None, near]
+        self.middle = np.clip(np.rint(centres[some]).astype(int), 0, (width - 1, height - 1))
+        side = int(np.ceil(OUTER_RADII * np.linalg.norm(axes[some], axis=2).max())) + 1
+        offsets = np.mgrid[-side : side + 1, -side : side + 1].reshape(2, -1)[::-1].astype(np.float32)
+        few = axes[some][:: max(1, len(some) // LIKE_DISCS)]
+        radii, away = _distances(np.broadcast_to(offsets, (len(few), *offsets.shape)), few)
+        near = ((radii < OUTER_RADII + 0.1) & (np.abs(away) < reach)).any(0)
+        self.offsets = offsets[:, near]
+        column, row = self.middle.T[:, :, None] + self.offsets.astype(int)[:, None]
         self.inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
         values = grey[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)].astype(np.float32)
         self.level = values.mean(1)
         self.values = values - self.level[:, None]
+        self._leave_out_others(centres, axes, some, min(reach / SPARE_REACH, FIRST_REACH))
+
+    def _leave_out_others(self, centres: ndarray, axes: ndarray, some: ndarray, reach: float) -> None:
+        """Pixels within reach of another disc are not this one's alone."""
+        apart = centres - centres[some, None]
+        span = np.linalg.norm(np.einsum("nij,nmj->nmi", np.linalg.inv(axes[some]), apart), axis=2)
+        half = np.abs(np.linalg.eigvalsh(axes[some])).min(1)
+        close = (span < 2.0 + 2.0 * reach / half[:, None]) & (span > 1e-9)
+        mine, other = np.nonzero(close)
+        if len(mine):
+            places = self.offsets + (self.middle[mine] - centres[other])[:, :, None].astype(np.float32)
+            theirs = _distances(places, axes[other])[1] < reach
+            np.logical_and.at(self.inside, mine, ~theirs)
+
+
+def _distances(
+    offsets: Float[ndarray, "n 2 k"], axes: Float[ndarray, "n 2 2"]
+) -> tuple[Float[ndarray, "n k"], Float[ndarray, "n k"]]:
+    """Of offsets from the centres of ellipses the radius in each one's frame, and the distance from it along
+    the ray, pixels.
+    """
+    radii = np.linalg.norm(np.linalg.inv(axes).astype(np.float32) @ offsets, axis=1)
+    return radii, (radii - 1.0) * np.linalg.norm(offsets, axis=1) / np.maximum(radii, 1e-6)
