@@ -47,7 +47,7 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
     """
     count = board.columns * board.rows
     best = Sight(np.zeros(0, dtype=int), np.zeros((0, 2)))
-    several, seen, shapes = False, 0, set()
+    several, laid, seen, shapes = False, False, 0, set()
     for side in COPY_SIDES:
         copy = resized(grey, side)
         if copy.shape in shapes or min(copy.shape) < SMALLEST_SIDE:
@@ -63,6 +63,7 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
                 ids, unsure = laid_on(board, discs, places, copy.shape)
                 several |= unsure
                 if (ids >= 0).sum() >= FEWEST_DISCS:
+                    laid = True
                     best = max(
                         best, _outlined(copy, whole, board, discs, ids), key=lambda sight: len(sight.ids)
                     )
@@ -70,6 +71,8 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
                     return best
     if len(best.ids) >= FEWEST_DISCS:
         return best
+    if laid:
+        return Unseen("is in it, but too blurred, dim or small to say where its discs are")
     if several:
         return Unseen("is in it in part only, and which part cannot be told")
     return Unseen(f"was not found in it: {seen} discs hang together, the board has {count}")

@@ -78,12 +78,14 @@ class FittedDiscs(NamedTuple):
         off: (n,12) how far the picture's outline is outside the ellipse in each sector, pixels.
         spread: (n,12) the standard deviation of that by noise, pixels.
         blur: (n,) w, pixels.
+        centre_spread: (n,) standard deviation of a centre by noise, pixels.
     """
 
     ellipses: Ellipses
     off: Float[ndarray, "n 12"]
     spread: Float[ndarray, "n 12"]
     blur: Float[ndarray, " n"]
+    centre_spread: Float[ndarray, " n"]
 
 
 def fit_discs(grey: ndarray, rough: Ellipses) -> FittedDiscs:
@@ -96,7 +98,7 @@ def fit_discs(grey: ndarray, rough: Ellipses) -> FittedDiscs:
     count = len(rough.centres)
     if not count:
         none = np.zeros((0, SECTORS))
-        return FittedDiscs(rough, none, none, np.zeros(0))
+        return FittedDiscs(rough, none, none, np.zeros(0), np.zeros(0))
     shrink = max(1, round(median(np.sqrt(np.abs(np.linalg.det(rough.axes)))) / USUAL_RADIUS))
     first, part = _surroundings(grey, rough)
     height, width = (side // shrink for side in part.shape)
@@ -107,7 +109,7 @@ def fit_discs(grey: ndarray, rough: Ellipses) -> FittedDiscs:
     centres = (fit.centres + 0.5) * shrink - 0.5 + first
     off, spread = fit.sectors()
     outlines = Ellipses(centres, fit.axes * shrink)
-    return FittedDiscs(outlines, off * shrink, spread * shrink, fit.blur * shrink)
+    return FittedDiscs(outlines, *(part * shrink for part in (off, spread, fit.blur, fit.centre_spread)))
 
 
 def _surroundings(grey: ndarray, discs: Ellipses) -> tuple[Int[ndarray, " 2"], ndarray]:
@@ -129,7 +131,7 @@ class _Fit:
         count = len(centres)
         self.half = np.abs(np.linalg.eigvalsh(axes)).min(1)
         self.blur = np.minimum(np.full(count, FIRST_BLUR), self._most_blur())
-        self.relief, self.noise = np.zeros((2, count))
+        self.relief, self.noise, self.centre_spread = np.zeros((3, count))
         self.level = np.ones(count)
         self.usual_blur, self.usual_relief, self.hold = FIRST_BLUR, 0.0, 0.0
         self.light, self.light_spread = np.zeros((count, 2)), np.inf
@@ -206,6 +208,7 @@ class _Fit:
             each[:, 8:] / level[:, None] for each in (solution, spread)
         )
         self.relief[here] = np.clip(half_step / level, -1.0, 1.0)
+        self.centre_spread[here] = spread[:, :2].max(1) / np.abs(half_step) * self.blur[here]
         limit = LARGEST_STEP_SHARE * self.half[here, None]
         moved = np.clip(solution[:, :5] / half_step[:, None] * self.blur[here, None], -limit, limit)
         self.centres[here] += moved[:, :2]

@@ -65,6 +65,9 @@ LEAST_SHARE = 1e-3
 MOST_ROUGHNESS = 0.12
 # A disc that is fitted as a whole has a shorter half axis of at least so many blurs.
 LEAST_BLURS = 1.5
+# Of a sure centre the standard deviation is less than this, pixels: it is within a pixel then, as good as
+# always.
+WIDEST_SPREAD = 0.2
 # The fit of a whole disc ends within this share of its radius from there.
 FARTHEST_RADII = 0.25
 # A sector of a whole disc's outline is off the ellipse by less than this share of a radius, or so many
@@ -187,7 +190,7 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Outlines:
 
 def _fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     """The outlines, each fitted to all pixels about it, but for discs hardly wider than the blur; NaN where a
-    sector of one is off.
+    sector of one is off, or noise hides where it is.
     """
     found = outlines.ellipses
     which = np.flatnonzero(np.isfinite(found.centres[:, 0]))
@@ -197,7 +200,7 @@ def _fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     wide = np.abs(np.linalg.eigvalsh(found.axes[which])).min(1, initial=np.inf) > LEAST_BLURS * fit.blur
     taken = wide & (moved < FARTHEST_RADII * size)
     off = np.maximum(MOST_SECTOR_RADII * size[:, None], MOST_SECTOR_SPREADS * fit.spread)
-    smooth = (np.abs(fit.off) < off).all(1) | ~taken
+    smooth = ((np.abs(fit.off) < off).all(1) | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
     centres, axes = found.centres.copy(), found.axes.copy()
     centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
     centres[which[~smooth]], axes[which[~smooth]] = np.nan, np.nan
