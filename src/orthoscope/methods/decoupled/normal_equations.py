@@ -27,7 +27,7 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.models.lenses.free import FreeLens
-from orthoscope.solve.losses import Linear, Loss
+from orthoscope.solve.losses import Loss
 
 __all__ = ["MeasurementSums", "Measurements", "spline_unknowns"]
 
@@ -135,7 +135,11 @@ class Measurements:
         self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"]
     ) -> Float[ndarray, "m p 2"]:
         """Projected minus detected, pixels; 0 where a corner was not seen."""
-        return self.sums(camera, poses, points, self._last[0][2] if self._last else Linear()).residuals
+        seen = self.observations.present > 0
+        in_camera = points @ poses.rotation.transpose(0, 2, 1) + poses.translation[:, None]
+        found = np.zeros((*seen.shape, 2))
+        found[seen] = camera.project(in_camera[seen], beyond=True) - self.observations.pixels()[seen]
+        return found
 
     def _weigh(self, stacked: ndarray, chunk: Chunk, loss: Loss) -> tuple[float, ndarray]:
         """The cost of a chunk, and the root of each corner's weight (views, n), by which its rows are
