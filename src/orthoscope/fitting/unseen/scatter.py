@@ -26,16 +26,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from orthoscope.fitting.slopes.linearised import Linearised
-from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, hat_of
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, say_of
 from orthoscope.geometry.arrays import Float, evenly, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import polynomials
 
-__all__ = ["ORDERS", "STRETCH_SHARE", "Scatter", "likenesses", "patterns_over_views", "scatter_of"]
+__all__ = [
+    "ORDERS",
+    "STRETCH_SHARE",
+    "Likeness",
+    "Scatter",
+    "likenesses",
+    "patterns_over_views",
+    "scatter_of",
+]
 
 # Patterns over a board have these orders: a pose takes those below, and of those above errors are as good as
 # independent.
@@ -96,6 +105,18 @@ class Scatter:
         return model * larger * larger[:, None]
 
 
+class Likeness(NamedTuple):
+    """Of patterns of one order.
+
+    Attributes:
+        tau: 1 or more, how much larger they are in the residuals than independent errors would make them.
+        moved: (m,d,c) how the camera moves by each of them, as errors of a view.
+    """
+
+    tau: float
+    moved: Float[ndarray, "m d c"]
+
+
 def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p 3"]) -> Scatter:
     """The scatter of a camera that was fitted together with poses and shape.
 
@@ -103,13 +124,10 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
         points: the target's corners, nominal.
     """
     some = fit.only(evenly(fit.views, VIEW_COUNT))
-    patterns = patterns_over_views(some, points)
-    tau = likenesses(some, patterns)
     camera = np.zeros((fit.of_camera, fit.of_camera))
-    for rows, larger in zip(patterns, tau, strict=True):
-        if larger > 1.0:
-            by_camera = fit.camera_columns.T @ some.pulls(rows).transpose(1, 0, 2).reshape(fit.unknowns, -1)
-            camera += (larger - 1.0) * by_camera @ by_camera.T
+    for larger, moved in likenesses(some, patterns_over_views(some, points)):
+        by_camera = moved.transpose(1, 0, 2).reshape(fit.of_camera, -1)
+        camera += (larger - 1.0) * by_camera @ by_camera.T
     stretch = _by_stretch(fit, points)
     alike = fit.camera_covariance + fit.noise * fit.views / some.views * camera + stretch
     prior = fit.prior_covariance + stretch
@@ -168,13 +186,14 @@ def patterns_over_views(
     return np.split(basis, np.cumsum(sizes)[:-1], axis=2)
 
 
-def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "_ _ _"]]) -> tuple[float, ...]:
-    """tau_o, 1 or more: how much larger each order's patterns are in the residuals than independent errors
-    would make them.
-    """
+def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "_ _ _"]]) -> list[Likeness]:
+    """Of each order's patterns, as `patterns_over_views` has them."""
+    explained, moved = say_of(fit, np.concatenate(patterns, axis=2))
+    own = np.diagonal(explained, axis1=1, axis2=2)
+    ends = np.cumsum([rows.shape[2] for rows in patterns])[:-1]
     found = []
-    for rows in patterns:
+    for rows, share, by_rows in zip(patterns, np.split(own, ends, 1), np.split(moved, ends, 2), strict=True):
         in_residuals = ((fit.errors[:, None] @ rows) ** 2).sum()
-        by_chance = fit.noise * float((rows**2).sum() - (rows * hat_of(fit, rows)).sum())
-        found.append(max(1.0, float(in_residuals) / max(by_chance, 1e-300)))
-    return tuple(found)
+        by_chance = fit.noise * float((rows**2).sum() - share.sum())
+        found.append(Likeness(max(1.0, float(in_residuals) / max(by_chance, 1e-300)), by_rows))
+    return found
