@@ -8,7 +8,7 @@ fitted first, and all from there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache, lru_cache
+from functools import cache
 from typing import Protocol
 
 from orthoscope.fitting.calibration import Calibration
@@ -45,7 +45,6 @@ class Fitter(Protocol):
         ...
 
 
-@lru_cache(maxsize=2)
 def some_of(detections: Detections) -> Detections:
     """The views that a choice is made from, and a fit of all starts from; the same each time."""
     views = len(detections.views) * CHOICE_CORNERS // max(detections.corners, 1)
