@@ -102,9 +102,9 @@ def test_a_board_that_always_stands_upright_may_be_stretched_and_nobody_would_kn
 
     upright, turned = scatter(roll=(-0.02, 0.02)), scatter()
     fx, fy = (upright.names.index(name) for name in ("fx", "fy"))
-    aspect = np.zeros(len(upright.stretch))
+    aspect = np.zeros(upright.stretch.shape[1])
     aspect[[fx, fy]] = 1.0 / NARROW.intrinsics.fx, -1.0 / NARROW.intrinsics.fy
-    open_upright, open_turned = (np.sqrt(aspect @ s.stretch @ aspect) for s in (upright, turned))
+    open_upright, open_turned = (np.linalg.norm(s.stretch @ aspect) for s in (upright, turned))
     assert open_upright > 0.25 * STRETCH_SHARE  # views are tilted, and tell a part of it
     assert open_turned < 0.3 * open_upright
     assert (np.diag(upright.alike) >= np.diag(upright.model)).all()

@@ -58,9 +58,9 @@ def residual_slopes(
             of_corner[chunk.rows] = turned.transpose(0, 1, 3, 2)
         if isinstance(camera.lens, FreeLens):
             lattice, places = camera.lens.over.lattice, _places(camera.lens, poses.only(chunk.rows), points)
-            of_spline.across[chunk.rows] = lattice.along(places[0], 0)[0]
+            of_spline.across[chunk.rows] = lattice.along(places[0], 0)
             of_spline.down[chunk.rows] = (
-                lattice.along(places[1], 1)[0] * observations.present[chunk.rows, :, None]
+                lattice.along(places[1], 1) * observations.present[chunk.rows, :, None]
             )
     frame = camera.lens_frame or camera.intrinsics
     surface = np.zeros((p, 0))

@@ -27,7 +27,7 @@ from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.spline import Displacement, Lattice
 from orthoscope.models.lenses.table import FREE
 from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
-from orthoscope.solve.least_squares import NormalEquations, Options, after_step, solve
+from orthoscope.solve.least_squares import NormalEquations, Options, Solution, after_step, solve
 from orthoscope.solve.losses import Huber
 
 __all__ = ["FORMULA", "LAST_TOLERANCE", "StepOneFit", "fit_step_one", "polished"]
@@ -184,12 +184,16 @@ def fit_step_one(
             noise, loss, place = evidence.noise, _loss(evidence.noise), None
         if evidence.agrees_with(before):
             break
-    return _ended(shape, problem, estimate, loss, evidence, tolerance, steps)
+    solution = _minimised(problem, estimate, loss, tolerance)
+    return _told(shape, problem, solution, loss, evidence, steps)
 
 
 def polished(fit: StepOneFit) -> StepOneFit:
     """A fit that was stopped early brought to its minimum, weights as they are."""
-    return _ended(fit.target, fit.problem, fit.estimate, fit.loss, fit.evidence, LAST_TOLERANCE, fit.steps)
+    solution = _minimised(fit.problem, fit.estimate, fit.loss, LAST_TOLERANCE)
+    if not solution.steps:
+        return fit
+    return _told(fit.target, fit.problem, solution, fit.loss, fit.evidence, fit.steps)
 
 
 class _Place(NamedTuple):
@@ -221,21 +225,29 @@ def _round(problem: Joint, place: _Place, loss: Huber) -> tuple[_Place, Known, F
     return place, known, problem.residuals(estimate), 1 + solution.steps
 
 
-def _ended(
+def _minimised(
+    problem: Joint, estimate: DecoupledEstimate, loss: Huber, tolerance: float
+) -> Solution[DecoupledEstimate]:
+    return solve(problem, estimate, loss=loss, options=Options(tolerance=tolerance, max_steps=50))
+
+
+def _told(
     target: str,
     problem: Joint,
-    estimate: DecoupledEstimate,
+    solution: Solution[DecoupledEstimate],
     loss: Huber,
     evidence: Evidence,
-    tolerance: float,
     steps: int,
 ) -> StepOneFit:
-    """The fit at the problem's minimum, and what it speaks for."""
-    solution = solve(problem, estimate, loss=loss, options=Options(tolerance=tolerance, max_steps=50))
+    """The fit at the problem's minimum, and what it speaks for.
+
+    Args:
+        evidence: that the problem's weights are of.
+        steps: that led to where the solution began.
+    """
     estimate, minimum = solution.unknowns, problem.minimum(solution.sums)
-    evidence = evidence.renewed(
-        problem, estimate, known=minimum.known, loss=loss, residuals=problem.residuals(estimate)
-    )
+    residuals = problem.residuals(estimate)
+    evidence = evidence.renewed(problem, estimate, known=minimum.known, loss=loss, residuals=residuals)
     return StepOneFit(
         target,
         problem,

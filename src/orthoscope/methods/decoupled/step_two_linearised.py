@@ -96,7 +96,7 @@ class PairsLeftOut:
             s2 * alike,
             s2 * prior,
             scattered(self.changes, self._groups),
-            0.0 * model,
+            np.zeros((0, len(model))),
         )
 
     def _steps_one(
