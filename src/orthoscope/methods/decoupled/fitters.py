@@ -16,7 +16,7 @@ from orthoscope.methods.decoupled.model import Model
 from orthoscope.methods.decoupled.representative import representative
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one, polished
 from orthoscope.methods.fccm import fit_flat
-from orthoscope.models.target_shape import SHAPES
+from orthoscope.models.lenses.table import FREE
 from orthoscope.targets.detections import Detections
 
 __all__ = ["Compared", "Fitter", "Kept", "some_of"]
@@ -52,7 +52,7 @@ def some_of(detections: Detections) -> Detections:
 
 
 class Compared:
-    """Each model from the nearest that was fitted before.
+    """Each model from the same with a free lens, where that was fitted before.
 
     Args:
         detections: the views.
@@ -64,28 +64,22 @@ class Compared:
     def __init__(self, detections: Detections, *, skew: bool, flats: dict[str, Calibration]) -> None:
         self.cold: dict[Model, StepOneFit] = {}
         self.flat = _flats(detections, skew, flats)
-        self._fitted: dict[Model, StepOneFit] = {}
+        self._free: dict[tuple[str, str], StepOneFit] = {}
 
     def step_one(self, model: Model) -> StepOneFit:
-        """Started from a richer one on the same base, and ended early.
+        """Started from a free lens on the same base and target, if there is one, and ended early.
 
-        The first of a base starts from nothing: bases are compared by it, and what another base found is not
+        What a poorer target leaves to the camera leads it elsewhere, and from there back the way is long. The
+        first of a base starts from nothing: bases are compared by it, and what another base found is not
         neutral between them.
         """
-        near = self._nearest(model)
+        near = self._free.get((model.base, model.shape))
         fit = _fit(self.flat(model.base), model, near)
-        self._fitted[model] = fit
+        if model.first_lens == FREE:
+            self._free[model.base, model.shape] = fit
         if near is None:
             self.cold[model] = fit
         return fit
-
-    def _nearest(self, model: Model) -> StepOneFit | None:
-        richer = [
-            fit
-            for other, fit in self._fitted.items()
-            if other.base == model.base and SHAPES.index(other.shape) >= SHAPES.index(model.shape)
-        ]
-        return richer[0] if richer else None
 
 
 class Kept:
