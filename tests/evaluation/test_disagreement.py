@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from helpers.boards import NARROW, perfect
 from helpers.studied import Recipe, found_in, made, photographs_by, richest_fit
-from orthoscope.evaluation.disagreement import changes_of, disagreement, spread_of, wishes
+from orthoscope.evaluation.disagreement import Views, changes_of, disagreement, spread_of, wishes
 from orthoscope.evaluation.groups import two_groups
 from orthoscope.fitting.unseen.leave_one_out import leave_one_out
 from orthoscope.models.lenses.table import Brown
@@ -116,7 +116,8 @@ def test_wishes_are_the_changes_that_residuals_ask_for():
     change = np.array([0.3, -0.2, 0.5])
     residual = np.zeros_like(fit.residual)
     residual[4] = fit.changes(changes)[4] @ change
-    asked = wishes(replace(fit, residual=residual), detections.target.points, moves).kappa
+    views = Views.of(replace(fit, residual=residual), detections.target.points, moves)
+    asked = wishes(views, range(3)).kappa
     # the fit's own share in the view is granted, so that a wish is a little larger than what was put in
     assert (asked[4] / -change >= 1.0).all()
     assert (asked[4] / -change < 2.0).all()

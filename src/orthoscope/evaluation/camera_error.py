@@ -121,21 +121,48 @@ class _Given(NamedTuple):
     differ_px: float
 
 
+class _Imaged(NamedTuple):
+    """A camera's scatter, and the slopes of its image of places by its unknowns, (n,2,d)."""
+
+    scatter: Scatter
+    slopes: Float[ndarray, "n 2 d"]
+
+    @classmethod
+    def of(cls, scatter: Scatter, rays: Float[ndarray, "n 3"]) -> _Imaged:
+        with np.errstate(invalid="ignore"):
+            return cls(scatter, image_slopes(scatter.camera, rays, scatter.names))
+
+    def settled(self, rays: Float[ndarray, "m 3"], fitted: int, distance: float) -> Float[ndarray, "m 2 d"]:
+        """The slopes at the first of the places, the motion taken out that undoes most over some of them.
+
+        Args:
+            rays: to these, of any lengths.
+            fitted: how many of them the motion is fitted to.
+        """
+        slopes = self.slopes[: len(rays)]
+        with np.errstate(invalid="ignore"):
+            motion = motion_slopes(self.scatter.camera, rays, distance)
+        undone = np.linalg.lstsq(
+            motion[:fitted].reshape(2 * fitted, -1), slopes[:fitted].reshape(2 * fitted, -1), rcond=None
+        )[0]
+        return slopes - motion @ undone
+
+
 class _Variances:
     """E^2 and its parts at places along unit rays, a motion fitted out over the first of them."""
 
     def __init__(
         self,
-        scatter: Scatter,
-        rich: Scatter | None,
-        poorer: Scatter,
+        own: _Imaged,
+        richer: _Imaged | None,
+        poorer: _Imaged,
         rays: Float[ndarray, "n 3"],
         fitted: int,
         distance: float,
         given: _Given,
     ) -> None:
         # rays may have lengths of their own: places along them, in units of the distance
-        slopes = _settled(scatter, rays, fitted, distance)
+        slopes, scatter = own.settled(rays, fitted, distance), own.scatter
         self.fitted = fitted
         self.model, self.alike = _spread(slopes[:fitted], scatter.repeated), _spread(slopes, scatter.alike)
         self.alike *= given.copies
@@ -145,20 +172,22 @@ class _Variances:
         draws = _effective_draws(np.nansum(self.moved[:fitted], axis=0))
         self.views = (draws * self.views + ALIKE_DRAWS * self.alike) / (draws + ALIKE_DRAWS)
         self.bias = np.zeros(len(rays))
-        if rich is not None:
-            of_rich = _settled(rich, rays, fitted, distance)
+        if richer is not None:
+            of_rich, rich = richer.settled(rays, fitted, distance), richer.scatter
             if not scatter.stretch.any():  # a target that is taken for flat hides a stretch as well
-                hidden = _spread(of_rich, rich.stretch)
+                hidden = ((of_rich @ rich.stretch.T) ** 2).sum((1, 2))
                 self.alike, self.views = self.alike + hidden, self.views + hidden
-            apart = difference_of_images(rich.camera, poorer.camera, rays, rays[:fitted], distance=distance)
-            if poorer is not scatter:
-                by_view = _settled(poorer, rays, fitted, distance) @ poorer.left_out.T
+            apart = difference_of_images(
+                rich.camera, poorer.scatter.camera, rays, rays[:fitted], distance=distance
+            )
+            if poorer is not own:
+                by_view = poorer.settled(rays, fitted, distance) @ poorer.scatter.left_out.T
             both = by_view - of_rich @ rich.left_out.T
             by_chance = np.nansum(both**2, axis=(1, 2))
             self.apart, self.by_chance = np.nan_to_num((apart**2).sum(1)), by_chance
             self.bias = np.maximum(self.apart - by_chance, 0.0)
         self.off, self.differ = np.zeros(len(rays)), given.differ_px**2
-        if given.judged is not None:
+        if given.judged is not None and given.judged is not scatter.camera:
             off = difference_of_images(scatter.camera, given.judged, rays, rays[:fitted], distance=distance)
             self.off = np.nan_to_num((off**2).sum(1))
             if np.mean(self.off[:fitted]) < AS_GOOD_SHARE**2 * np.nanmean(self.total[:fitted]):
@@ -228,10 +257,12 @@ def predicted_error(
     ways, given = ways_from(middle, camera.image_size), _Given(copies, judged, differ_px)
     places = np.concatenate([rays, camera.unproject(cells), camera.unproject(ways.reshape(-1, 2))])
     part_seen, part_frame = slice(len(seen)), slice(len(seen), len(seen) + len(cells))
-    far = _Variances(scatter, richest, poorer or scatter, places, len(seen), np.inf, given)
+    own, richer = _Imaged.of(scatter, places), richest and _Imaged.of(richest, places)
+    other = _Imaged.of(poorer, places) if poorer and poorer is not scatter else own
+    far = _Variances(own, richer, other, places, len(seen), np.inf, given)
     close = places[: part_frame.stop].copy()
     close[part_seen] *= each[:, None] / typical
-    near = _Variances(scatter, richest, poorer or scatter, close, len(seen), typical, given)
+    near = _Variances(own, richer, other, close, len(seen), typical, given)
     seen_px, model_px, alike_px, views_px, bias_px = far.parts
     along = np.sqrt(far.total[part_frame.stop :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
     corners = seen if corners is None else corners
@@ -282,21 +313,6 @@ def picked(pixels: Float[ndarray, "n 2"]) -> Int[ndarray, " s"]:
     """Which of the detected corners `seen_places` picks."""
     order = np.lexsort(pixels.T)
     return order[evenly(len(order), PLACE_COUNT)]
-
-
-def _settled(
-    scatter: Scatter, rays: Float[ndarray, "n 3"], fitted: int, distance: float
-) -> Float[ndarray, "n 2 d"]:
-    """Slopes of the image by the camera's unknowns, the motion taken out that undoes most over the first
-    places.
-    """
-    with np.errstate(invalid="ignore"):
-        slopes = image_slopes(scatter.camera, rays, scatter.names)
-        motion = motion_slopes(scatter.camera, rays, distance)
-    undone = np.linalg.lstsq(
-        motion[:fitted].reshape(2 * fitted, -1), slopes[:fitted].reshape(2 * fitted, -1), rcond=None
-    )[0]
-    return slopes - motion @ undone
 
 
 def _effective_draws(squares: Float[ndarray, " m"]) -> float:

@@ -29,7 +29,7 @@ from orthoscope.evaluation.disagreement import Disagreement, changes_of, disagre
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.slopes.linearised import Linearised
-from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, hat_of, leave_one_out
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, leave_one_out, say_of
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
@@ -127,7 +127,7 @@ def two_groups(
 def _quadratics(fit: Linearised, noise: float, more: tuple[str, ...] = ()) -> _Quadratics:
     _, changes = changes_of(fit, more)
     moves = fit.moves(changes)
-    told = moves.transpose(0, 2, 1) @ (moves - hat_of(fit, moves))
+    told = moves.transpose(0, 2, 1) @ moves - say_of(fit, moves)[0]
     return _Quadratics(
         (moves * fit.errors[..., None]).sum(1) / noise, 0.5 * (told + told.transpose(0, 2, 1)) / noise
     )

@@ -30,9 +30,12 @@ __all__ = [
     "Problem",
     "Solution",
     "Status",
+    "after_step",
+    "blocks_times",
     "eliminated",
     "inverse_roots",
     "shared_covariance",
+    "side_by_side",
     "solve",
 ]
 
@@ -233,6 +236,23 @@ def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray
     return covariance
 
 
+def after_step(
+    sums: NormalEquations, shared: Float[ndarray, " k"], views: Float[ndarray, "m p"]
+) -> NormalEquations:
+    """The sums where a step leads, as far as residuals are linear.
+
+    Args:
+        sums: those before it.
+        shared: the shared step, (k,).
+        views: each view's step, (m,p).
+    """
+    B = side_by_side(sums.B)
+    a = sums.a + sums.A @ shared + B @ views.T.ravel()
+    c = sums.c + (shared @ B).reshape(views.T.shape).T + (sums.C @ views[:, :, None])[:, :, 0]
+    cost = sums.cost + float((sums.a + a) @ shared + ((sums.c + c) * views).sum())
+    return sums._replace(cost=cost, a=a, c=c)
+
+
 class _Damping:
     """lambda, after Nielsen: less the better a step kept its promise, ever more after steps up the cost.
 
@@ -305,10 +325,11 @@ def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndar
     try:
         system, solved = (_with_triangles if C.shape[2] > WIDEST_INVERTED else _with_inverses)(sums, C)
         system[np.diag_indices_from(system)] += of_shared
-        shared = -np.linalg.solve(system, sums.a - np.einsum("mkp,mp->k", sums.B, solved(sums.c)))
+        B = side_by_side(sums.B)
+        shared = -np.linalg.solve(system, sums.a - B @ solved(sums.c).T.ravel())
     except np.linalg.LinAlgError:  # singular as far as numbers go
         return np.zeros_like(sums.a), np.zeros_like(sums.c), float("nan")
-    views = -solved(sums.c + shared @ sums.B)
+    views = -solved(sums.c + (shared @ B).reshape(sums.c.T.shape).T)
     damped = of_shared @ shared**2 + (of_views * views**2).sum()
     return shared, views, float(-(sums.a @ shared) - (sums.c * views).sum() + damped)
 
@@ -366,9 +387,21 @@ def eliminated(sums: NormalEquations, roots: Float[ndarray, "m p p"]) -> Float[n
     at_once = max(1, NUMBERS_AT_ONCE // max(k * p, 1))
     for start in range(0, m, at_once):
         some = slice(start, start + at_once)
-        W = (sums.B[some] @ roots[some]).transpose(1, 0, 2).reshape(k, len(roots[some]) * p)
+        W = blocks_times(sums.B[some], roots[some]).reshape(k, p * len(roots[some]))
         left -= W @ W.T
     return left
+
+
+def side_by_side(B: Float[ndarray, "m k p"]) -> Float[ndarray, "k c"]:
+    """All blocks beside each other, the first column of each first; no copy where they are stored so."""
+    m, k, p = B.shape
+    return B.transpose(1, 2, 0).reshape(k, p * m)
+
+
+def blocks_times(B: Float[ndarray, "m k p"], G: Float[ndarray, "m p p"]) -> Float[ndarray, "k p m"]:
+    """B G of every block, laid out as `side_by_side` wants it: all blocks at once, entry by entry."""
+    factors = np.ascontiguousarray(G.transpose(1, 2, 0))
+    return np.einsum("kim,ijm->kjm", B.transpose(1, 2, 0), factors)
 
 
 def inverse_roots(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:

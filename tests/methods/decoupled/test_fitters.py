@@ -51,7 +51,8 @@ def test_many_views_are_fitted_by_way_of_some(photographs: Detections, monkeypat
         np.array(some_first.estimate.camera.intrinsics.as_tuple()[:4])
         - straight.estimate.camera.intrinsics.as_tuple()[:4]
     )
-    assert (apart < 0.05 * deviations[:4]).all()
+    # Weights are found in a few rounds, and these had those of the eight views before them.
+    assert (apart < 0.1 * deviations[:4]).all()
 
 
 def test_views_that_stand_for_all_do_not_depend_on_their_order(photographs: Detections):

@@ -104,6 +104,24 @@ class SharedInverse(NamedTuple):
         of_corners = scaled - self.blocks @ (self.crossed.T @ found).reshape(blocks)
         return np.concatenate([found[:n], of_corners.reshape(-1, columns)])
 
+    def between(
+        self, pulls: Float[ndarray, "m q c"]
+    ) -> tuple[Float[ndarray, "m c c"], Float[ndarray, "m s c"]]:
+        """b'H^-1 b of vectors (q,c) of each view, and the shared unknowns' part of H^-1 b; half the work of
+        `times`.
+        """
+        (m, q, c), s = pulls.shape, len(self.covariance)
+        right, n = np.zeros((s, m * c)), q - self.crossed.shape[1]
+        right[:n] = pulls[:, :n].transpose(1, 0, 2).reshape(n, m * c)
+        squares = np.zeros((m, c, c))
+        if len(self.blocks):
+            own = pulls[:, n:].transpose(1, 0, 2).reshape(len(self.blocks), SPACE, m * c)
+            scaled = (self.blocks @ own).reshape(-1, m * c)
+            right -= self.crossed @ scaled
+            squares = pulls[:, n:].transpose(0, 2, 1) @ scaled.reshape(-1, m, c).transpose(1, 0, 2)
+        found = (self.covariance @ right).reshape(s, m, c).transpose(1, 0, 2)
+        return squares + right.reshape(s, m, c).transpose(1, 2, 0) @ found, found[:, :n]
+
 
 @dataclass(frozen=True, eq=False)
 class Linearised:

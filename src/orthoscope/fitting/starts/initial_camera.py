@@ -116,20 +116,19 @@ class StartingCameras:
         """Zhang's closed form as a camera without distortion; where the full form fails, with the principal
         point at the centre.
         """
-        basis = self.narrowing.basis
-        for allowed in (
-            basis,
-            *(narrower for narrower in (NO_SKEW, CENTRED_SQUARE) if len(narrower) < len(basis)),
-        ):
-            K = intrinsics_of_homographies(self._homographies, self.image_size, allowed)
-            if K is not None and _plausible(K, self.image_size):
-                return self._pinhole_with(K)
+        if self._closed_form is not None and _plausible(self._closed_form, self.image_size):
+            return self._pinhole_with(self._closed_form)
+        for allowed in (NO_SKEW, CENTRED_SQUARE):
+            if len(allowed) < len(self.narrowing.basis):
+                K = intrinsics_of_homographies(self._homographies, self.image_size, allowed)
+                if K is not None and _plausible(K, self.image_size):
+                    return self._pinhole_with(K)
         return None
 
     @cached_property
     def closed_form_is_off_the_frame(self) -> bool:
         """Whether Zhang's closed form puts the principal point beyond the frame, a camera else."""
-        K = intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)
+        K = self._closed_form
         return (
             K is not None
             and _plausible(K, self.image_size, FARTHEST_AWAY)
@@ -144,7 +143,7 @@ class StartingCameras:
         """
         if "cx" not in self.narrowing.free:
             return []
-        found = [intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)]
+        found = [self._closed_form]
         width, height = self.image_size
         for x, y in PLACES_AROUND:
             away = np.array([[1.0, 0.0, -x * width], [0.0, 1.0, -y * height], [0.0, 0.0, 1.0]])
@@ -156,6 +155,11 @@ class StartingCameras:
             if K is not None and _plausible(K, self.image_size, FARTHEST_AWAY)
         ]
         return sorted(starts, key=self.misfit)[:MOST_STARTS]
+
+    @cached_property
+    def _closed_form(self) -> Intrinsics | None:
+        """Zhang's."""
+        return intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)
 
     @cached_property
     def _homographies(self) -> Float[ndarray, "m 3 3"]:

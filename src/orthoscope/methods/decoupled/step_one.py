@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +19,14 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods.decoupled.evidence import Evidence, first_guess
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
-from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint
+from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known
 from orthoscope.methods.decoupled.start import Start, nearer
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.spline import Displacement, Lattice
 from orthoscope.models.lenses.table import FREE
 from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
-from orthoscope.solve.least_squares import Options, solve
+from orthoscope.solve.least_squares import NormalEquations, Options, Solution, after_step, solve
 from orthoscope.solve.losses import Huber
 
 __all__ = ["FORMULA", "LAST_TOLERANCE", "StepOneFit", "fit_step_one", "polished"]
@@ -58,6 +59,7 @@ class StepOneFit:
     it speaks for.
 
     Attributes:
+        loss: how errors count.
         covariance: (k,k) of the free parameters.
         steps, status: of the solver.
     """
@@ -65,6 +67,7 @@ class StepOneFit:
     target: str
     problem: Joint
     estimate: DecoupledEstimate
+    loss: Huber
     evidence: Evidence
     covariance: Float[ndarray, "k k"]
     steps: int
@@ -84,11 +87,6 @@ class StepOneFit:
     def start(self) -> Start:
         """For other fits to start from."""
         return Start(self.estimate, self.evidence)
-
-    @property
-    def loss(self) -> Huber:
-        """How errors count, for noise as large as was found."""
-        return _loss(self.evidence.noise)
 
     def with_formula(self, camera: Camera, free: Sequence[str]) -> float:
         """For another camera in the place of the estimate's: how many parameters the data determine in
@@ -155,53 +153,102 @@ def fit_step_one(
     if near:
         start = nearer(start, near.start, free_corners=shape == "free")
     estimate, evidence = start
-    energy = _energy(estimate.camera)
     measurements = Measurements(observations, estimate.camera, free, corners_move=shape != "flat")
+    problem = Joint(
+        measurements,
+        points,
+        free,
+        surface=basis,
+        energy=_energy(estimate.camera),
+        single=shape == "free",
+        precisions=evidence.precisions(basis.shape[1]),
+        parts=parts,
+    )
     noise, loss = evidence.noise, _loss(evidence.noise)
-    steps, settled = 0, False
-    for round_ in range(ROUND_LIMIT):
-        last = settled or round_ == ROUND_LIMIT - 1
-        precisions = evidence.precisions(basis.shape[1])
-        problem = Joint(
-            measurements,
-            points,
-            free,
-            surface=basis,
-            energy=energy,
-            single=shape == "free",
-            precisions=precisions,
-            parts=parts,
-        )
-        options = Options(tolerance=tolerance if last else ROUND_TOLERANCE, max_steps=50)
+    place, steps = None, 0
+    for _ in range(ROUND_LIMIT - 1):
+        place = place or _Place(estimate, problem.measured(estimate, loss))
+        place, known, residuals, more = _round(problem, place, loss)
+        estimate, steps = place.estimate, steps + more
+        before = evidence
+        evidence = evidence.renewed(problem, estimate, known=known, loss=loss, residuals=residuals)
+        problem = problem.weighed(evidence.precisions(basis.shape[1]))
         if abs(evidence.noise / noise - 1.0) > KEPT_LOSS_SHARE:
-            noise, loss = evidence.noise, _loss(evidence.noise)
-        solution = solve(problem, estimate, loss=loss, options=options)
-        estimate, steps = solution.unknowns, steps + solution.steps
-        known = problem.known(solution.sums)
-        renewed = evidence.renewed(problem, estimate, solution.cost, known)
-        if last:
-            return StepOneFit(
-                shape, problem, estimate, renewed, renewed.noise * known.camera, steps, solution.status.value
-            )
-        settled = renewed.agrees_with(evidence)
-        evidence = renewed
-    raise AssertionError("the last round returns")
+            noise, loss, place = evidence.noise, _loss(evidence.noise), None
+        if evidence.agrees_with(before):
+            break
+    solution = _minimised(problem, estimate, loss, tolerance)
+    return _told(shape, problem, solution, loss, evidence, steps)
 
 
 def polished(fit: StepOneFit) -> StepOneFit:
     """A fit that was stopped early brought to its minimum, weights as they are."""
-    solution = solve(
-        fit.problem, fit.estimate, loss=fit.loss, options=Options(tolerance=LAST_TOLERANCE, max_steps=50)
-    )
-    known = fit.problem.known(solution.sums)
-    evidence = fit.evidence.renewed(fit.problem, solution.unknowns, solution.cost, known)
-    return replace(
-        fit,
-        estimate=solution.unknowns,
-        evidence=evidence,
-        covariance=evidence.noise * known.camera,
-        steps=fit.steps + solution.steps,
-        status=solution.status.value,
+    solution = _minimised(fit.problem, fit.estimate, fit.loss, LAST_TOLERANCE)
+    if not solution.steps:
+        return fit
+    return _told(fit.target, fit.problem, solution, fit.loss, fit.evidence, fit.steps)
+
+
+class _Place(NamedTuple):
+    """An estimate, and the sums of its measurements."""
+
+    estimate: DecoupledEstimate
+    sums: NormalEquations
+
+
+def _round(problem: Joint, place: _Place, loss: Huber) -> tuple[_Place, Known, Float[ndarray, "m p 2"], int]:
+    """Where the problem's cost is least, what is known there, the residuals, and how many steps it took.
+
+    One step that keeps its promise is enough, and the sums after it follow from those before.
+    """
+    sums = problem.with_priors(place.sums, place.estimate)
+    step = problem.minimum(sums)
+    there = problem.move(place.estimate, step.shared, step.blocks)
+    residuals = problem.residuals(there)
+    cost = problem.cost(there, loss, residuals)
+    if abs(cost - (sums.cost - step.promised)) <= ROUND_TOLERANCE * cost:
+        return (
+            _Place(there, after_step(place.sums, step.shared, step.blocks)), step.known, residuals, 1,
+        )  # fmt: skip
+    start = there if cost < sums.cost else place.estimate
+    solution = solve(problem, start, loss=loss, options=Options(tolerance=ROUND_TOLERANCE, max_steps=50))
+    estimate = solution.unknowns
+    place = _Place(estimate, problem.measured(estimate, loss))
+    return place, problem.known(solution.sums), problem.residuals(estimate), 1 + solution.steps
+
+
+def _minimised(
+    problem: Joint, estimate: DecoupledEstimate, loss: Huber, tolerance: float
+) -> Solution[DecoupledEstimate]:
+    return solve(problem, estimate, loss=loss, options=Options(tolerance=tolerance, max_steps=50))
+
+
+def _told(
+    target: str,
+    problem: Joint,
+    solution: Solution[DecoupledEstimate],
+    loss: Huber,
+    evidence: Evidence,
+    steps: int,
+) -> StepOneFit:
+    """The fit at the problem's minimum, and what it speaks for.
+
+    Args:
+        evidence: that the problem's weights are of.
+        steps: that led to where the solution began.
+    """
+    estimate, known = solution.unknowns, problem.known(solution.sums)
+    residuals = problem.residuals(estimate)
+    evidence = evidence.renewed(problem, estimate, known=known, loss=loss, residuals=residuals)
+    return StepOneFit(
+        target,
+        problem,
+        estimate,
+        loss,
+        evidence,
+        evidence.noise * known.camera,
+        steps + solution.steps,
+        solution.status.value,
     )
 
 
