@@ -21,6 +21,7 @@ quadratics).
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -34,9 +35,7 @@ from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
-from orthoscope.methods.fccm import fit_flat
 from orthoscope.models.lenses.table import FREE
-from orthoscope.targets.detections import Detections
 
 __all__ = ["Groups", "two_groups"]
 
@@ -78,6 +77,42 @@ class Groups(NamedTuple):
     unsure: tuple[int, ...] = ()
 
 
+class _Cameras:
+    """Cameras of groups of the views, every corner free and a free lens, each fitted once.
+
+    Args:
+        together: one camera for all, with a flat target: what each group's fit starts from.
+    """
+
+    def __init__(self, together: Calibration) -> None:
+        self._together = together
+        self._fitted, self.squares = cache(self._fit), cache(self._squares)
+
+    def agree(self, group: tuple[int, ...]) -> bool:
+        """Whether the views of a group agree on one camera: halves of a zoom in many steps, or of photographs
+        by a rolling shutter, are better than the whole, but are no cameras.
+        """
+        known = linearised(self._fitted(group))
+        return not disagreement(known, self._together.detections.only(group)).certain
+
+    def _fit(self, group: tuple[int, ...]) -> StepOneFit:
+        start = replace(
+            self._together,
+            detections=self._together.detections.only(group),
+            camera_from_target=tuple(self._together.camera_from_target[i] for i in group),
+        )
+        return fit_step_one(start, shape="free", first_lens=FREE, tolerance=COMPARED_TOLERANCE)
+
+    def _squares(self, group: tuple[int, ...]) -> Float[ndarray, " m"]:
+        """Squared error of each view by a group's camera: left out where it is of the group."""
+        detections, fit = self._together.detections, self._fitted(group)
+        shape, camera = fit.shape, fit.estimate.camera
+        poses = resect(camera, detections, shape=shape, near=self._together.camera_from_target)
+        squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
+        squares[list(group)] = leave_one_out(linearised(fit)).squares
+        return squares
+
+
 class _Quadratics(NamedTuple):
     """What the views say of a change k: 2 k's_j + k'T_j k, over the noise.  score (m,c), told (m,c,c)."""
 
@@ -97,7 +132,7 @@ class _Quadratics(NamedTuple):
 
 
 def two_groups(
-    fit: Linearised, found: Disagreement, whole: LeaveOneOut, detections: Detections, *, base: str
+    fit: Linearised, found: Disagreement, whole: LeaveOneOut, together: Calibration
 ) -> Groups | None:
     """The two groups that photographs which do not agree fall into; None where they fall into no two.
 
@@ -105,8 +140,7 @@ def two_groups(
         fit: of all views, every corner free and a free lens.
         found: how they disagree.
         whole: each view left out of the fit; one by one, since copies may be of two cameras.
-        detections: of the fit.
-        base: the formula under the free lens.
+        together: the same views by one camera and a flat target, its lens the formula under the free one.
     """
     if found.wishes is None or fit.views < 2 * FEWEST_GROUP_VIEWS:
         return None
@@ -115,10 +149,10 @@ def two_groups(
     explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
     joint = float(np.nansum(whole.squares))
     starts = [each for _, each in groupings[:REFINED_GROUPINGS]] if explained > LEAST_EXPLAINED_SHARE else []
-    together = fit_flat(detections, lens=base) if starts else None
-    squares, second = _best_refined(together, starts, joint) if together else (np.inf, None)
-    if together and second is not None and np.sqrt(squares / joint) < APART_SHARE:
-        if not _agree_by_themselves(together, second):
+    cameras = _Cameras(together)
+    squares, second = _best_refined(cameras, starts, joint)
+    if second is not None and np.sqrt(squares / joint) < APART_SHARE:
+        if not all(cameras.agree(group) for group in _parts(second)):
             return None
         return _named(second, np.ones(len(second), dtype=bool))
     return None if found.kind == "shutter" else _two_values(_quadratics(fit, noise))
@@ -207,7 +241,7 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
 
 
 def _best_refined(
-    together: Calibration, starts: list[Bool[ndarray, " m"]], joint: float
+    cameras: _Cameras, starts: list[Bool[ndarray, " m"]], joint: float
 ) -> tuple[float, Bool[ndarray, " m"] | None]:
     """The refined grouping with the least squares; no more starts where two have come to it, or some are
     without hope.
@@ -218,7 +252,7 @@ def _best_refined(
     best: tuple[float, ndarray | None] = (np.inf, None)
     hopeless = 0
     for start in starts:
-        refined = _refined(together, start, joint)
+        refined = _refined(cameras, start, joint)
         if refined is None:
             continue
         hopeless += refined[0] > HOPELESS_SHARE**2 * joint
@@ -231,66 +265,41 @@ def _best_refined(
     return best
 
 
-def _agree_by_themselves(together: Calibration, second: Bool[ndarray, " m"]) -> bool:
-    """Whether each group agrees on one camera: halves of a zoom in many steps, or of photographs by a rolling
-    shutter, are better than the whole, but are no cameras.
-    """
-    for group in (np.flatnonzero(~second), np.flatnonzero(second)):
-        known = linearised(_fit(together, group))
-        if disagreement(known, together.detections.only(group)).certain:
-            return False
-    return True
+def _parts(second: Bool[ndarray, " m"]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """The indices of the first group's views and of the second's."""
+    return tuple(np.flatnonzero(~second).tolist()), tuple(np.flatnonzero(second).tolist())
 
 
 def _refined(
-    together: Calibration, second: Bool[ndarray, " m"], joint: float
+    cameras: _Cameras, second: Bool[ndarray, " m"], joint: float
 ) -> tuple[float, Bool[ndarray, " m"]] | None:
     """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no
     camera.
 
     Args:
-        together: one camera for all, with a flat target: what each group's fit starts from.
-        joint: the squares of one camera for all; where two leave too much of them, views stay where they are.
+        joint: the squares of one camera for all; where two leave too much of them, or one alone does, views
+            stay where they are.
     """
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
     for _ in range(REFINING_ROUNDS):
-        if (
-            second.tobytes() in seen
-            or not FEWEST_GROUP_VIEWS <= second.sum() <= len(second) - FEWEST_GROUP_VIEWS
-        ):
+        parts, total = _parts(second), 0.0
+        if second.tobytes() in seen or min(map(len, parts)) < FEWEST_GROUP_VIEWS:
             break
         seen.add(second.tobytes())
         try:
-            squares = np.stack([_squares(together, np.flatnonzero(group)) for group in (~second, second)])
+            for part in sorted(parts, key=len):
+                total += float(cameras.squares(part)[list(part)].sum())
+                if not total <= HOPELESS_SHARE**2 * joint:
+                    break
         except CalibrationError:
             break
-        total = float(np.where(second, squares[1], squares[0]).sum())
         if np.isfinite(total) and (best is None or total < best[0]):
             best = total, second
         if not total <= HOPELESS_SHARE**2 * joint:
             break
-        second = squares[1] < squares[0]
+        second = cameras.squares(parts[1]) < cameras.squares(parts[0])
     return best
-
-
-def _squares(together: Calibration, group: ndarray) -> Float[ndarray, " m"]:
-    """Squared error of each view by a group's camera: left out where it is of the group."""
-    detections, fit = together.detections, _fit(together, group)
-    shape, camera = fit.shape, fit.estimate.camera
-    poses = resect(camera, detections, shape=shape, near=together.camera_from_target)
-    squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
-    squares[group] = leave_one_out(linearised(fit)).squares
-    return squares
-
-
-def _fit(together: Calibration, group: ndarray) -> StepOneFit:
-    start = replace(
-        together,
-        detections=together.detections.only(group),
-        camera_from_target=tuple(together.camera_from_target[i] for i in group),
-    )
-    return fit_step_one(start, shape="free", first_lens=FREE, tolerance=COMPARED_TOLERANCE)
 
 
 def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -35,7 +36,8 @@ from orthoscope.methods.own_centre import CENTRE_OPEN, with_own_centre
 from orthoscope.models.lenses.table import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
 from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Loss
-from orthoscope.targets.detections import Detections
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target
 from orthoscope.version import __version__
 
 __all__ = ["fccm", "fit_flat"]
@@ -119,10 +121,8 @@ def fit_flat(
     if loss not in LOSSES:
         raise InputError(f"loss {loss!r} is not known; expected one of {', '.join(LOSSES)}.")
     used = with_usable_views(detections)
-    narrowing = Assumptions.of(len(used.views), skew=skew)
-    observations = Observations.of(used)
-    sample = observations.thinned(SAMPLE_CORNERS)
-    bases = StartingCameras(sample, used.target.points, used.image_size, narrowing)
+    observations, bases = _starting(used.views, used.target, used.image_size, skew)
+    narrowing, sample = bases.narrowing, bases.observations
     lens = suited_lens(bases) if lens == AUTO else lens
     kind, coefficients = (parse_centred_lens if own_centre else parse_lens)(lens)
     free = (*narrowing.free, *coefficients)
@@ -178,6 +178,19 @@ def fit_flat(
             *left_open,
         ),
     )
+
+
+@lru_cache(maxsize=2)
+def _starting(
+    views: tuple[View, ...], target: Target, image_size: tuple[int, int], skew: bool
+) -> tuple[Observations, StartingCameras]:
+    """The views' corners, and where a calibration of them starts, whatever its lens: who tries several lenses
+    asks for it several times.
+    """
+    observations = Observations.of(Detections(target, image_size, views))
+    narrowing = Assumptions.of(len(views), skew=skew)
+    sample = observations.thinned(SAMPLE_CORNERS)
+    return observations, StartingCameras(sample, target.points, image_size, narrowing)
 
 
 def _nearer(start: Estimate, bases: StartingCameras, free: tuple[str, ...], loss: Loss) -> Estimate:

@@ -110,6 +110,7 @@ class StartingCameras:
             image_size,
             narrowing,
         )
+        self._refined: dict[Camera, Camera] = {}
 
     @cached_property
     def pinhole(self) -> Estimate | None:
@@ -208,6 +209,11 @@ class StartingCameras:
         """A base camera with its own lens's first coefficients fitted, robustly, in a few steps, to some of
         the views.
         """
+        if base.camera not in self._refined:
+            self._refined[base.camera] = self._refine(base)
+        return self._refined[base.camera]
+
+    def _refine(self, base: Estimate) -> Camera:
         rows = self.observations.evenly(SAMPLE_VIEWS)
         camera, some = base.camera, self.observations.only(rows)
         problem = Reprojection(some, self.points, camera, (*self.narrowing.free, *camera.lens.free[:2]))

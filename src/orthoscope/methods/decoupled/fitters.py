@@ -46,7 +46,7 @@ class Fitter(Protocol):
 
 
 def some_of(detections: Detections) -> Detections:
-    """The views that a choice is made from, and a fit of all starts from."""
+    """The views that a choice is made from, and a fit of all starts from; the same each time."""
     views = len(detections.views) * CHOICE_CORNERS // max(detections.corners, 1)
     return representative(detections, max(views, CHOICE_VIEWS))
 
@@ -57,10 +57,11 @@ class Compared:
     Args:
         detections: the views.
         skew: whether K has one.
-        flats: calibrations of a flat target that are there already, by their base.
+        flats: calibrations of a flat target that are there already, by their base; those that are made here
+            are put there too.
     """
 
-    def __init__(self, detections: Detections, *, skew: bool, flats: Mapping[str, Calibration]) -> None:
+    def __init__(self, detections: Detections, *, skew: bool, flats: dict[str, Calibration]) -> None:
         self.cold: dict[Model, StepOneFit] = {}
         self.flat = _flats(detections, skew, flats)
         self._fitted: dict[Model, StepOneFit] = {}
@@ -103,10 +104,10 @@ class Kept:
         detections: Detections,
         *,
         skew: bool,
-        flats: Mapping[str, Calibration] | None = None,
+        flats: dict[str, Calibration] | None = None,
         cold: Mapping[Model, StepOneFit] | None = None,
     ) -> None:
-        some, flats = some_of(detections), flats or {}
+        some, flats = some_of(detections), {} if flats is None else flats
         self.detections, self._cold = detections, dict(cold or {})
         self.flat = _flats(detections, skew, flats)
         self.of_some = self if some is detections else Kept(some, skew=skew, flats=flats, cold=cold)
@@ -125,9 +126,7 @@ class Kept:
         return self._cold[model]
 
 
-def _flats(
-    detections: Detections, skew: bool, known: Mapping[str, Calibration]
-) -> Callable[[str], Calibration]:
+def _flats(detections: Detections, skew: bool, known: dict[str, Calibration]) -> Callable[[str], Calibration]:
     """Calibrations of a flat target by their base, each made once; those that are there already are taken
     where they are of these very views.
     """
@@ -137,7 +136,9 @@ def _flats(
         there = known.get(base)
         if there is not None and there.detections is detections:
             return there
-        return fit_flat(detections, lens=base, skew=skew)
+        made = fit_flat(detections, lens=base, skew=skew)
+        known.setdefault(base, made)
+        return made
 
     return flat
 

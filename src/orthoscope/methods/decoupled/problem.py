@@ -22,6 +22,7 @@ import numpy as np
 
 from orthoscope.fitting.observations import Poses
 from orthoscope.fitting.reprojection import POSE
+from orthoscope.fitting.slopes.linearised import SharedInverse
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements, MeasurementSums
@@ -82,13 +83,14 @@ class Known(NamedTuple):
 
 class Minimum(NamedTuple):
     """Of the sums as they are: the step there, of shared unknowns and of blocks; by how much it lowers the
-    cost; what the data determined.
+    cost; what the data determined; the inverse that says all this.
     """
 
     shared: ndarray
     blocks: ndarray
     promised: float
     known: Known
+    inverse: SharedInverse
 
 
 class Joint:
@@ -184,10 +186,6 @@ class Joint:
             float((singles * unknowns.singles**2).sum()),
         )
 
-    def known(self, sums: NormalEquations) -> Known:
-        """What the data determined, from the sums where a solve ended."""
-        return self.minimum(sums).known
-
     def minimum(self, sums: NormalEquations) -> Minimum:
         """Where the sums are least, and what is known there.
 
@@ -201,7 +199,11 @@ class Joint:
         right = sums.c + (shared @ B).reshape(sums.c.T.shape).T
         blocks = -(inverse @ right[:, :, None])[:, :, 0]
         promised = float(-(sums.a @ shared) - (sums.c * blocks).sum())
-        return Minimum(shared, blocks, promised, self._known(covariance, inverse, Y))
+        known = self._known(covariance, inverse, Y)
+        kept = (
+            SharedInverse(covariance, inverse, B) if self.by_corner else SharedInverse.of_shared(covariance)
+        )
+        return Minimum(shared, blocks, promised, known, kept)
 
     def _known(self, covariance: ndarray, inverse: ndarray, Y: Float[ndarray, "s q b"]) -> Known:
         """Y: what was left, with the blocks that were eliminated, times their inverse."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.slopes.linearised import SharedInverse
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods.decoupled.evidence import Evidence, first_guess
@@ -60,7 +61,7 @@ class StepOneFit:
 
     Attributes:
         loss: how errors count.
-        covariance: (k,k) of the free parameters.
+        inverse: of the sums at the estimate.
         steps, status: of the solver.
     """
 
@@ -69,9 +70,15 @@ class StepOneFit:
     estimate: DecoupledEstimate
     loss: Huber
     evidence: Evidence
-    covariance: Float[ndarray, "k k"]
+    inverse: SharedInverse
     steps: int
     status: str
+
+    @property
+    def covariance(self) -> Float[ndarray, "k k"]:
+        """Of the free parameters."""
+        k = len(self.problem.free)
+        return self.evidence.noise * self.inverse.covariance[:k, :k]
 
     @property
     def views(self) -> int:
@@ -102,7 +109,7 @@ class StepOneFit:
             precisions=problem.precisions,
             parts=problem.parts,
         )  # fmt: skip
-        known = other.known(other.linearise(self.estimate._replace(camera=camera), self.loss))
+        known = other.minimum(other.linearise(self.estimate._replace(camera=camera), self.loss)).known
         return len(free) + float(known.surface.sum() + known.singles.sum())
 
     @property
@@ -214,7 +221,8 @@ def _round(problem: Joint, place: _Place, loss: Huber) -> tuple[_Place, Known, F
     solution = solve(problem, start, loss=loss, options=Options(tolerance=ROUND_TOLERANCE, max_steps=50))
     estimate = solution.unknowns
     place = _Place(estimate, problem.measured(estimate, loss))
-    return place, problem.known(solution.sums), problem.residuals(estimate), 1 + solution.steps
+    known = problem.minimum(solution.sums).known
+    return place, known, problem.residuals(estimate), 1 + solution.steps
 
 
 def _minimised(
@@ -237,16 +245,16 @@ def _told(
         evidence: that the problem's weights are of.
         steps: that led to where the solution began.
     """
-    estimate, known = solution.unknowns, problem.known(solution.sums)
+    estimate, minimum = solution.unknowns, problem.minimum(solution.sums)
     residuals = problem.residuals(estimate)
-    evidence = evidence.renewed(problem, estimate, known=known, loss=loss, residuals=residuals)
+    evidence = evidence.renewed(problem, estimate, known=minimum.known, loss=loss, residuals=residuals)
     return StepOneFit(
         target,
         problem,
         estimate,
         loss,
         evidence,
-        evidence.noise * known.camera,
+        minimum.inverse,
         steps + solution.steps,
         solution.status.value,
     )
