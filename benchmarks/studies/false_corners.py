@@ -3,6 +3,8 @@
     python -m benchmarks.studies.false_corners                           400 photographs
     python -m benchmarks.studies.false_corners --count 10000 --seed 1    others, and more of them
     python -m benchmarks.studies.false_corners --verbose                 a line for each false corner
+    python -m benchmarks.studies.false_corners --only circles            those of some boards
+    python -m benchmarks.studies.false_corners --log seen.jsonl          what was seen is kept
 
 Photographs are 640x480, by a lens `brown` and a fisheye in turn; sharp, usual and poor ones (`QUALITIES`);
 tilts to 65 degrees; boards fill a quarter of the picture to all of it, one in four stands over its rim, one
@@ -14,9 +16,12 @@ where most corners of a photograph are false.
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import cv2
@@ -35,7 +40,7 @@ from orthoscope.simulation.scene import random_views
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
-__all__ = ["BOARDS", "Shown", "errors_of", "photographs"]
+__all__ = ["BOARDS", "Outcome", "Shown", "errors_of", "outcome_of", "photographs"]
 
 BOARDS = (
     "chessboard:9x6:25mm",
@@ -182,6 +187,53 @@ def errors_of(shown: Shown, sight: Sight) -> Float[ndarray, " n"]:
     return min((np.where(np.isfinite(one), one, np.inf) for one in off), key=np.median)
 
 
+class Outcome(NamedTuple):
+    """What came of one photograph.
+
+    Attributes:
+        number, target, quality, told: of the photograph.
+        shown: corners that are in the picture.
+        corners: that were found.
+        square, worst: sum of their squared errors and the largest, px.
+        false: how many are false.
+        seconds: of process time.
+    """
+
+    number: int
+    target: str
+    quality: str
+    told: str
+    shown: int
+    corners: int
+    square: float
+    worst: float
+    false: int
+    seconds: float
+
+
+def outcome_of(shown: Shown) -> Outcome:
+    """What comes of looking for its target in a photograph."""
+    before = time.process_time()
+    sight = see(shown.picture, shown.target)
+    seconds = time.process_time() - before
+    errors = errors_of(shown, sight) if isinstance(sight, Sight) else np.zeros(0)
+    width, height = shown.picture.shape[::-1]
+    inside = ((shown.truth > 2) & (shown.truth < [width - 3, height - 3])).all(1)
+    finite = np.minimum(errors, 1e6)
+    return Outcome(
+        shown.number,
+        shown.target.name,
+        shown.quality,
+        shown.told,
+        int(inside.sum()),
+        len(errors),
+        round(float((finite**2).sum()), 6),
+        round(float(finite.max(initial=0.0)), 4),
+        int((errors > FALSE_PX).sum()),
+        round(seconds, 4),
+    )
+
+
 class _Tally:
     """What photographs of one board, or of all, came to."""
 
@@ -190,18 +242,16 @@ class _Tally:
         self.false = self.with_false = self.wrong_ids = 0
         self.worst, self.square, self.seconds = 0.0, 0.0, 0.0
 
-    def add(self, shown: Shown, errors: Float[ndarray, " n"], seconds: float) -> None:
-        width, height = shown.picture.shape[::-1]
-        self.photographs, self.found = self.photographs + 1, self.found + (len(errors) > 0)
-        self.corners, self.seconds = self.corners + len(errors), self.seconds + seconds
-        self.shown += int(((shown.truth > 2) & (shown.truth < [width - 3, height - 3])).all(1).sum())
-        false = int((errors > FALSE_PX).sum())
-        wrong = len(errors) > 0 and false > 0.5 * len(errors)
+    def add(self, one: Outcome) -> None:
+        self.photographs, self.found = self.photographs + 1, self.found + (one.corners > 0)
+        self.corners, self.seconds = self.corners + one.corners, self.seconds + one.seconds
+        self.shown += one.shown
+        wrong = one.false > 0.5 * one.corners
         self.wrong_ids += wrong
-        self.false, self.with_false = self.false + false, self.with_false + (false > 0)
+        self.false, self.with_false = self.false + one.false, self.with_false + (one.false > 0)
         if not wrong:
-            self.worst = max(self.worst, float(errors.max(initial=0.0)))
-            self.square += float((errors**2).sum())
+            self.worst = max(self.worst, one.worst)
+            self.square += one.square
 
     def row(self, name: str) -> str:
         """As a row of a table."""
@@ -221,24 +271,21 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=400)
     parser.add_argument("--first", type=int, default=0, help="the number of the first")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="", help="of boards whose description begins so")
+    parser.add_argument("--log", type=Path, help="a line of JSON for each photograph")
     parser.add_argument(
         "--verbose", action="store_true", help="a line for each photograph with false corners"
     )
     given = parser.parse_args()
     cv2.setNumThreads(1)
     tallies: dict[str, _Tally] = {}
-    for shown in photographs(given.count, seed=given.seed, first=given.first):
-        before = time.process_time()
-        sight = see(shown.picture, shown.target)
-        seconds = time.process_time() - before
-        errors = errors_of(shown, sight) if isinstance(sight, Sight) else np.zeros(0)
-        for name in (f"`{shown.target.name}`", shown.quality, "all"):
-            tallies.setdefault(name, _Tally()).add(shown, errors, seconds)
-        if given.verbose and (errors > FALSE_PX).any():
-            off = ", ".join(f"{error:.1f}" for error in np.sort(errors[errors > FALSE_PX])[::-1][:6])
+    for one in _outcomes(given):
+        for name in (f"`{one.target}`", one.quality, "all"):
+            tallies.setdefault(name, _Tally()).add(one)
+        if given.verbose and one.false:
             print(
-                f"  {shown.number}: {(errors > FALSE_PX).sum()} of {len(errors)} ({off} px)"
-                f" {shown.target.name} {shown.quality} {shown.told}",
+                f"  {one.number}: {one.false} of {one.corners} ({one.worst:.1f} px)"
+                f" {one.target} {one.quality} {one.told}",
                 flush=True,
             )
     print(
@@ -249,6 +296,27 @@ def main() -> None:
     for name in [*(f"`{_target(spec).name}`" for spec in BOARDS), *QUALITIES, "all"]:
         if name in tallies:
             print(tallies[name].row(name))
+
+
+def _outcomes(given: argparse.Namespace) -> Iterator[Outcome]:
+    """Of all photographs that are asked for; those that the log has from there."""
+    known = {}
+    if given.log and given.log.exists():
+        lines = given.log.read_text(encoding="utf-8").splitlines()
+        known = {one.number: one for one in (Outcome(*json.loads(line)) for line in lines)}
+    log = given.log.open("a", encoding="utf-8") if given.log else nullcontext()
+    with log as file:
+        for number in range(given.first, given.first + given.count):
+            if not BOARDS[number % len(BOARDS)].startswith(given.only):
+                continue
+            one = known.get(number)
+            if one is None:
+                for shown in photographs(1, seed=given.seed, first=number):
+                    one = outcome_of(shown)
+                if one and file:
+                    print(json.dumps(one), file=file, flush=True)
+            if one:
+                yield one
 
 
 if __name__ == "__main__":

@@ -9,8 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from orthoscope.detection.chessboards.grid import grid_shape, lattice, nearest_neighbour, one_line_more
+from orthoscope.detection.saddles.linked import are_linked, hang_together
 from orthoscope.detection.saddles.refine import refined
 from orthoscope.detection.saddles.saddle import fit_saddles
+from orthoscope.detection.saddles.saddle_arms import saddle_arms
 
 PLACE = np.array([[20.3, 19.6]])
 
@@ -72,6 +74,53 @@ def test_what_is_no_saddle_is_hardly_explained():
     assert fitted(noise).explained < 0.5
     for grey in (edge, flat):
         assert np.isfinite(fitted(grey).places).all()
+
+
+WINDOW = {"along": np.array([[12.0, 1.0]]), "down": np.array([[-1.0, 12.0]]), "bends": np.zeros((1, 2))}
+
+
+def arms_of(grey: np.ndarray):
+    """The fitted saddle and what its arms say."""
+    saddles = fitted(grey)
+    return saddles, saddle_arms(grey, saddles, **WINDOW, arms=np.ones(1))
+
+
+def test_glare_in_a_square_moves_no_arm_and_the_corner_less_where_squares_need_not_be_alike():
+    y, x = np.mgrid[:41, :41] - PLACE[0, ::-1, None, None]
+    plain = picture(angle=0.0, contrast=50.0)
+    middle = 6.0 if plain[30, 30] > 128 else -6.0  # of the bright square at the right
+    glare = 1.0 + 0.8 * np.exp(-((x - 6.0) ** 2 + (y - middle) ** 2) / (2.0 * 4.0**2))
+    saddles, told = arms_of(np.clip(np.rint(plain * glare), 0, 255).astype(np.uint8))
+    assert saddles.explained < 0.95  # of a plain one all is
+    assert np.abs(told.shifts).max() < 1.0
+    off, off_before = np.hypot(*(told.places - PLACE).T), np.hypot(*(saddles.places - PLACE).T)
+    assert off < 0.5 * off_before
+
+
+def test_a_finger_over_an_arm_moves_that_arm():
+    y, x = np.mgrid[:41, :41] - PLACE[0, ::-1, None, None]
+    grey = np.where((x - 9) ** 2 + (y - 1) ** 2 < 6**2, 150, picture(angle=0.0)).astype(np.uint8)
+    _, told = arms_of(grey)
+    differ = (np.abs(told.shifts) > np.maximum(1.0, 4.0 * told.spread)).any()
+    assert differ or told.steps.min() < 0.25
+
+
+def test_a_corner_beyond_a_gap_that_is_numbered_as_the_one_beside_it_does_not_hang_together():
+    cells = lattice(9, 6).astype(int)
+    pixels = 30.0 * cells
+    seen = (cells[:, 0] < 5) | ((cells == (6, 2)).all(1))
+    assert are_linked(pixels[seen], cells[seen], cells[seen].astype(float)).all()  # foreseen, and there
+    pixels[(cells == (6, 2)).all(1)] += (0.0, 30.0)
+    kept = are_linked(pixels[seen], cells[seen], cells[seen].astype(float))
+    assert (kept == (cells[seen][:, 0] < 5)).all()
+
+
+def test_a_linked_corner_that_is_off_by_a_third_of_a_step_does_not_hang_together():
+    cells = lattice(9, 6).astype(int)
+    pixels = 30.0 * cells
+    pixels[22] += 12.0
+    kept = hang_together(pixels, cells, cells.astype(float))
+    assert list(np.flatnonzero(~kept)) == [22]
 
 
 def circles(columns: int = 9, rows: int = 6, radius: float = 400.0):

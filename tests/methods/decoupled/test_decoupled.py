@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -35,7 +34,6 @@ from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.table import Brown, Division
-from orthoscope.models.target_shape import SHAPES as KINDS
 from orthoscope.models.target_shape import without_similarity
 from orthoscope.simulation.scene import Scene, paper_scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections
@@ -102,7 +100,7 @@ def test_candidates_are_told_with_what_each_loses_against_the_one_that_was_taken
     tried = {
         (candidate.target, candidate.lens) for candidate in found.candidates if candidate.base == "brown"
     }
-    assert tried == set(product(KINDS, ("brown", "free")))
+    assert tried == {("flat", "brown"), ("free", "free")}  # the simplest and the richest
     assert all(candidate.views == len(found.detections.views) for candidate in found.candidates)
     taken = next(candidate for candidate in found.candidates if candidate.loses_px == 0.0)
     assert (taken.target, taken.lens) == (found.settings["shape"], found.settings["lens"])

@@ -32,6 +32,7 @@ from orthoscope.detection.chessboards.partial_board import (
     laid_out,
     placements,
 )
+from orthoscope.detection.saddles.linked import are_linked
 from orthoscope.detection.saddles.refine import Refined, refined
 from orthoscope.detection.saddles.saddle_points import saddle_points
 from orthoscope.detection.saddles.smooth_grid import off_smooth_grid
@@ -63,9 +64,6 @@ TOO_MANY_RATIO = 1.5
 FLOOR_RATIO = 6
 # A corner that is off its neighbours' lines is sought again so many times.
 REPAIR_ROUNDS = 2
-# A corner of whose window the saddle explains less than of others is kept where it lies no farther from where
-# all others foresee it, pixels.
-FORESEEN_PX = 0.4
 # A corner is off its neighbours' lines by at least so many steps, and so many times the usual stray.
 OFF_LIMITS = (0.1, 6.0)
 # A corner that is no saddle is off by at least so many steps, and so many times the usual stray.
@@ -119,7 +117,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         if sight and len(sight.ids) == board.columns * board.rows:
             large = (other for other in others if len(other.pixels) >= SECOND_BOARD_SHARE * len(sight.ids))
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in large)
-            return _sure(sight, TWICE if alike else "")
+            return _sure(sight, board, TWICE if alike else "")
         parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: int(sight.sure.sum()), default=None)
     count = board.columns * board.rows
@@ -128,15 +126,18 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
     ):
         best = _by_opencv(grey, board) or best
     if best:
-        return _sure(best)
+        return _sure(best, board)
     return Unseen("is in it in part only, and which part cannot be told" if open_ else "was not found in it")
 
 
-def _sure(laid: _Laid, remark: str = "") -> Sight | Unseen:
-    """The corners of a board that are sure."""
-    if laid.sure.sum() < FEWEST_PART_CORNERS:
+def _sure(laid: _Laid, board: Chessboard | MarkedChessboard, remark: str = "") -> Sight | Unseen:
+    """The corners of a board that are sure and hang together."""
+    ids, pixels = laid.ids[laid.sure], laid.pixels[laid.sure]
+    cells = np.stack([ids % board.columns, ids // board.columns], axis=1)
+    linked = are_linked(pixels, cells, cells.astype(float))
+    if linked.sum() < FEWEST_PART_CORNERS:
         return Unseen("is in it, but too blurred, dim or small to say where its corners are")
-    return Sight(laid.ids[laid.sure], laid.pixels[laid.sure], remark)
+    return Sight(ids[linked], pixels[linked], remark)
 
 
 def _in_photograph(
@@ -284,7 +285,7 @@ def _on_smooth_grid(
     arms: Float[ndarray, " m"],
 ) -> tuple[Refined, Bool[ndarray, " m"]]:
     """The corners, those that are off where all others foresee them sought again from there; and which stay
-    off. What lies where it is foreseen is whole, though something may cover a part of its window.
+    off.
     """
     on = np.flatnonzero(~off)
     if not len(on):
@@ -294,12 +295,10 @@ def _on_smooth_grid(
     away, foreseen, limit = off_smooth_grid(
         fine.pixels[on], places[on], step, doubtful=~fine.believed[on], poor=poor
     )
-    whole = fine.whole.copy()
-    whole[on] |= np.hypot(*(fine.pixels[on] - foreseen).T) < FORESEEN_PX
-    fine = fine._replace(whole=whole)
     if not away.any():
         return fine, off
     pixels, believed, sure, off = fine.pixels.copy(), fine.believed.copy(), fine.sure.copy(), off.copy()
+    whole = fine.whole.copy()
     pixels[on[away]] = foreseen[away]
     again = refined(grey, pixels[on], places[on], approach=False, arm=arms[on])
     pixels[on[away]], believed[on[away]] = again.pixels[away], again.believed[away]

@@ -10,9 +10,10 @@ import numpy as np
 
 from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
 from orthoscope.detection.markers.markers import Markers, find_markers, of_one_board, remark_on
+from orthoscope.detection.saddles.linked import hang_together
 from orthoscope.detection.saddles.refine import refined
 from orthoscope.detection.sight import Sight, Unseen
-from orthoscope.geometry.arrays import ndarray
+from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.targets.aprilgrid import BORDER_SQUARES, DICTIONARY, TAG_SQUARES, AprilGrid
 
 __all__ = ["see_aprilgrid"]
@@ -70,6 +71,11 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
             f"was not found in it: {len(ids) // 4} of its tags were, but without squares at their corners"
         )
     ids, pixels = ids[sure], pixels[sure]
+    cells = np.stack([ids % board.grid[0], ids // board.grid[0]], axis=1)
+    linked = hang_together(pixels, cells, board.places()[ids])
+    if linked.sum() < FEWEST_CORNERS:
+        return Unseen(f"was not found in it: of its corners only {linked.sum()} are sure")
+    ids, pixels = ids[linked], pixels[linked]
     order = np.argsort(ids)
     return Sight(ids[order], pixels[order], remark)
 
@@ -90,7 +96,7 @@ def _next_to(
     ids: ndarray, pixels: ndarray, board: AprilGrid, shape: tuple[int, ...]
 ) -> tuple[ndarray, ndarray]:
     """Corners of tags that were not read, next to some that were, where a parabola through those foresees
-    them.
+    them; a line where these are on two rows or columns only.
     """
     places = board.places()
     missing = np.setdiff1d(np.arange(len(places)), ids)
@@ -102,11 +108,16 @@ def _next_to(
     for corner, distances in zip(missing[close], apart[close], strict=True):
         nearest = np.argsort(distances, kind="stable")[:FORESEEING_CORNERS]
         x, y = (places[ids[nearest]] - places[corner]).T * board.spacing
-        terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-        start.append(np.linalg.lstsq(terms, pixels[nearest], rcond=None)[0][0])
+        start.append(np.linalg.lstsq(_terms(x, y), pixels[nearest], rcond=None)[0][0])
     foreseen = np.array(start).reshape(-1, 2)
     inside = ((foreseen >= RIM_PX) & (foreseen <= np.array(shape[::-1]) - 1 - RIM_PX)).all(1)
     return missing[close][inside], foreseen[inside]
+
+
+def _terms(x: Float[ndarray, " n"], y: Float[ndarray, " n"]) -> Float[ndarray, "n t"]:
+    """A polynomial's terms at the corners, of second order as far as these determine it."""
+    bent = [one * one for one in (x, y) if len(set(np.round(one, 6).tolist())) > 2]
+    return np.stack([np.ones_like(x), x, y, x * y, *bent], axis=1)
 
 
 def _of_board(markers: Markers, board: AprilGrid) -> tuple[ndarray, ndarray, str]:

@@ -15,6 +15,7 @@ import numpy as np
 from orthoscope.detection.chessboards.grid import grid_shape
 from orthoscope.detection.chessboards.partial_board import filled
 from orthoscope.detection.markers.markers import Markers, find_markers, homography_of, of_one_board, remark_on
+from orthoscope.detection.saddles.linked import hang_together
 from orthoscope.detection.saddles.refine import refined
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import Bool, Float, ndarray
@@ -49,6 +50,8 @@ def see_charuco(grey: ndarray, board: Charuco) -> Sight | Unseen:
     columns, rows = board.grid
     grid = _foreseen(markers, board.marker_corners(legacy=legacy), columns, rows)
     corners, good = _grown(grey, grid, board.arm)
+    cells = np.argwhere(good)[:, ::-1]
+    good[good] = hang_together(corners[good], cells, cells.astype(float))
     if good.sum() < FEWEST_CORNERS:
         return Unseen(
             f"was not found in it: {len(markers.numbers)} of its markers were, but no corners between them"

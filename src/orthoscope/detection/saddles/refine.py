@@ -19,6 +19,7 @@ import numpy as np
 from orthoscope.detection.chessboards.grid import GridShape, grid_shape, nearest_neighbour
 from orthoscope.detection.noise import noise_variance
 from orthoscope.detection.saddles.saddle import Saddles, fit_saddles
+from orthoscope.detection.saddles.saddle_arms import SaddleArms, saddle_arms
 from orthoscope.geometry.arrays import Bool, Float, distinct, median, ndarray
 
 __all__ = ["Refined", "refined"]
@@ -48,11 +49,19 @@ WIDEST_SPREAD = 0.19
 WIDEST_TURN = 0.4
 # A sure corner has more than this share of the usual contrast.
 LEAST_CONTRAST_SHARE = 0.35
-# Of a whole corner's window the saddle leaves at most so much more than of most, as a share of its variance
-# and, with that, of the share that is noise.
+# Where the saddle leaves at most so much more of a window than of most, as a share of its variance, nothing
+# covers it; where much is noise, the arms are asked wherever more than this share of that is left.
+HARDLY_UNEXPLAINED, HARDLY_UNEXPLAINED_NOISE = 0.005, 0.1
+# Where the arms are known better than this, pixels, what is left is that the window's squares are not alike.
+SMALL_ARM_SPREAD = 0.2
+# What no arm tells from noise leaves at most so much more than of most, and of the share that is noise.
 MOST_UNEXPLAINED, MOST_UNEXPLAINED_NOISE = 0.03, 0.3
 # Where a marker reaches into the window, whose blur is in it, so much more.
 MOST_UNEXPLAINED_BY_MARKS = 0.1
+# An arm of a whole corner would move it by less than this, pixels, or so many standard deviations.
+MOST_ARM_SHIFT, MOST_ARM_SPREADS = 1.0, 4.0
+# The step across each arm of a whole corner is at least this share of the saddle's.
+LEAST_ARM_STEP_SHARE = 0.25
 # A mark on one side of a sure corner is farther from its edges than so many of the fitted blurs.
 CLEAR_BLURS = 2.0
 # A fit explains at least this share of what is not noise of its window's variance, or is not believed.
@@ -67,8 +76,7 @@ class Refined(NamedTuple):
         believed: whether a saddle was fitted; else cornerSubPix had the last word.
         explained: share of its window's variance that the saddle explains.
         sure: whether the saddle says to well within a pixel where the corner is, and is like the others'.
-        whole: whether it is as true to the picture as most: where something covers a part of a window, it is
-            explained less.
+        whole: whether all its arms agree about it; where something covers a part of a window, they do not.
     """
 
     pixels: Float[ndarray, "m 2"]
@@ -104,29 +112,42 @@ def refined(
     step = square / shrink
     near = _near(small, near, step) if approach else near
     shape = grid_shape(near, places)
-    saddles = fit_saddles(
-        cv2.GaussianBlur(small, (0, 0), SMOOTHING_SIGMA),
-        near,
-        _window(shape.along),
-        _window(shape.down),
-        bends=np.stack([shape.bend_along, shape.bend_down], axis=1),
-        arms=(arms := _arms(shape, arm)),
-    )
+    along, down = _window(shape.along), _window(shape.down)
+    bends, arms = np.stack([shape.bend_along, shape.bend_down], axis=1), _arms(shape, arm)
+    smooth = cv2.GaussianBlur(small, (0, 0), SMOOTHING_SIGMA)
+    saddles = fit_saddles(smooth, near, along, down, bends=bends, arms=arms)
     allowed = np.maximum(FARTHEST_SHARE * step, 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
     noise = NOISE_LEFT_SHARE * noise_variance(small)
     noise_share = noise / np.maximum(signal + noise, 1e-9)
     least = LEAST_SADDLE_SHARE * (1.0 - noise_share)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
-    pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     sure = believed & (saddles.spread * shrink < WIDEST_SPREAD)
     sure &= _are_clear(saddles, step, arm)
     if not (sure & (_turn(saddles, shape) < WIDEST_TURN)).all():  # what is off was perhaps not near yet
         shape = grid_shape(saddles.places, places)
-    most_left = np.where(arms < 1.0, MOST_UNEXPLAINED_BY_MARKS, MOST_UNEXPLAINED)
     left = 1.0 - saddles.explained - noise_share
-    whole = left - median(left) < most_left + MOST_UNEXPLAINED_NOISE * noise_share
+    left -= median(left)
+    whole = np.ones(len(left), dtype=bool)
+    asked = np.flatnonzero(left > HARDLY_UNEXPLAINED + HARDLY_UNEXPLAINED_NOISE * noise_share)
+    if len(asked):
+        some = Saddles(*(part[asked] for part in saddles))
+        told = saddle_arms(smooth, some, along[asked], down[asked], bends=bends[asked], arms=arms[asked])
+        most_left = np.where(arms < 1.0, MOST_UNEXPLAINED_BY_MARKS, MOST_UNEXPLAINED)
+        little = left < most_left + MOST_UNEXPLAINED_NOISE * noise_share
+        whole[asked] = _have_whole_arms(told, little[asked])
+        unlike = (arms[asked] >= 1.0) & (told.spread < SMALL_ARM_SPREAD).all(1)
+        saddles.places[asked[unlike]] = told.places[unlike]
+    pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     return Refined(pixels, believed, saddles.explained, sure & _are_alike(saddles, shape), whole)
+
+
+def _have_whole_arms(told: SaddleArms, little: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:
+    """Which saddles have arms that agree; or whose noise hides it, and which leave little else."""
+    shifts = np.abs(told.shifts)
+    agree = (shifts < MOST_ARM_SHIFT).all(1)
+    differ = (shifts > np.maximum(MOST_ARM_SHIFT, MOST_ARM_SPREADS * told.spread)).any(1)
+    return (agree | little) & ~differ & (told.steps > LEAST_ARM_STEP_SHARE).all(1)
 
 
 def _are_alike(saddles: Saddles, shape: GridShape) -> Bool[ndarray, " m"]:

@@ -29,7 +29,7 @@ import numpy as np
 from orthoscope.detection.saddles.saddle_windows import COLUMN_COUNT, Shapes, Windows
 from orthoscope.geometry.arrays import Float, median, ndarray
 
-__all__ = ["Saddles", "fit_saddles"]
+__all__ = ["Saddles", "fit_saddles", "in_pixels"]
 
 # A stage has a share of the window, and pixels: a corner that moves less has arrived (what is left is its
 # square).
@@ -161,7 +161,7 @@ class _Fit:
         self.sums[here] = sums
         solution, self.explained[here], self.noise[here] = _solved(sums, self._damping(here, sums))
         contrast = self.contrast[here] = solution[:, 5]
-        step = _in_pixels(
+        step = in_pixels(
             solution[:, :5] / np.where(np.abs(contrast) < 1e-9, 1e-9, contrast)[:, None], shapes.of(here)
         )
         step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
@@ -189,7 +189,7 @@ class _Fit:
         blur, bends = np.maximum(self.shapes.blur, median(self.shapes.blur)), self.shapes.bends
         shapes = Shapes(self.shapes.places, self.shapes.angles, blur, bends, self.shapes.relief)
         units = np.broadcast_to(np.eye(5)[:2], (len(blur), 2, 5))
-        turned = np.stack([_in_pixels(units[:, i], shapes)[:, :2] for i in (0, 1)], axis=2)
+        turned = np.stack([in_pixels(units[:, i], shapes)[:, :2] for i in (0, 1)], axis=2)
         variances = np.linalg.eigvalsh(turned @ of_columns @ turned.transpose(0, 2, 1))
         return np.sqrt(np.maximum(variances[:, -1], 0.0))
 
@@ -208,7 +208,7 @@ def _solved(
     return solution, 1.0 - left / np.maximum(variance, 1e-9), left / np.maximum(weight, 1.0)
 
 
-def _in_pixels(column_steps: Float[ndarray, "n 5"], shapes: Shapes) -> Float[ndarray, "n 5"]:
+def in_pixels(column_steps: Float[ndarray, "n 5"], shapes: Shapes) -> Float[ndarray, "n 5"]:
     """The step of x, y, t1, t2 and log w that makes such multiples of the first five columns."""
     f1, f2, turn1, turn2, blurring = column_steps.T
     (c1, c2), (s1, s2) = np.cos(shapes.angles).T, np.sin(shapes.angles).T

@@ -21,10 +21,12 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
-__all__ = ["COLUMN_COUNT", "Shapes", "Windows"]
+__all__ = ["ARM_COUNT", "COLUMN_COUNT", "Shapes", "Windows"]
 
 # A window has so many columns besides the picture.
 COLUMN_COUNT = 9
+# A saddle has so many arms.
+ARM_COUNT = 4
 # Beyond this share of a window a pixel's weight is below 2 %.
 INNER_SHARE = 0.93
 
@@ -91,9 +93,6 @@ class Windows:
         saddles.
         """
         a1, a2, d1, d2, u, v = self._distances(which, shapes)
-        bend1, bend2 = (0.5 * shapes.blur * shapes.bends.T)[:, :, None].astype(np.float32)
-        d1 -= bend1 * a1 * a1
-        d2 += bend2 * a2 * a2
         columns = np.empty((len(which), COLUMN_COUNT + 1, d1.shape[1]), dtype=np.float32)
         f1, f2, f1_a1, f2_a2, blurring, saddle, one, across, upright, picture = columns.transpose(1, 0, 2)
         np.multiply(_root_weights(u, v, self._arms[which]), self._inside[which], out=one)
@@ -111,16 +110,39 @@ class Windows:
         np.multiply(one, self._pixels[which], out=picture)
         return _products(columns)
 
+    def arm_sums(self, which: Int[ndarray, " k"], shapes: Shapes) -> Float[ndarray, "k 16 16"]:
+        """Weighted sums of products of the columns that let each arm of a saddle move by itself, and the
+        picture (`saddle_arms.py`): four squares, four arms' shifts and turns, blur, and light across and
+        upright.
+        """
+        a1, a2, d1, d2, u, v = self._distances(which, shapes)
+        weights = _root_weights(u, v, self._arms[which]) * self._inside[which]
+        e1, e2 = np.tanh(d1), np.tanh(d2)
+        sides1, sides2 = (0.5 + 0.5 * e1, 0.5 - 0.5 * e1), (0.5 + 0.5 * e2, 0.5 - 0.5 * e2)
+        f1, f2 = 1.0 - e1 * e1, 1.0 - e2 * e2
+        squares = [one * two for one in sides1 for two in sides2]
+        shifts = [f1 * side for side in sides2] + [f2 * side for side in sides1]
+        turns = [shift * a for shift, a in zip(shifts, (a1, a1, a2, a2), strict=True)]
+        light = [np.broadcast_to(offset, e1.shape) for offset in self._offsets[:2]]
+        blurring = f1 * e2 * d1 + e1 * f2 * d2
+        columns = np.stack([*squares, *shifts, *turns, blurring, *light, self._pixels[which]], axis=1)
+        columns *= weights[:, None]
+        return _products(columns)
+
     def _distances(self, which: ndarray, shapes: Shapes) -> Float[ndarray, "6 n k"]:
-        """Along both edges and from both (straight ones, the second's sign turned), in blurs; along both
-        sides of the window, in halves.
+        """Along both edges and from both (the second's sign turned), in blurs; along both sides of the
+        window, in halves.
         """
         (c1, c2), (s1, s2) = np.cos(shapes.angles).T / shapes.blur, np.sin(shapes.angles).T / shapes.blur
         forms = np.empty((6, len(which), 3))
         forms[:4, :, :2] = np.array([[c1, s1], [c2, s2], [-s1, c1], [s2, -c2]]).transpose(0, 2, 1)
         forms[4:, :, :2] = self._to_window[:, which]
         forms[:, :, 2] = -(forms[:, :, :2] * (shapes.places - self._middle[which])).sum(-1)
-        return (forms.reshape(-1, 3).astype(np.float32) @ self._offsets).reshape(6, len(which), -1)
+        out = (forms.reshape(-1, 3).astype(np.float32) @ self._offsets).reshape(6, len(which), -1)
+        bend1, bend2 = (0.5 * shapes.blur * shapes.bends.T)[:, :, None].astype(np.float32)
+        out[2] -= bend1 * out[0] * out[0]
+        out[3] += bend2 * out[1] * out[1]
+        return out
 
 
 def _inverses(along: ndarray, down: ndarray) -> Float[ndarray, "2 n 2"]:
