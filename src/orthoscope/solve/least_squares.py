@@ -47,6 +47,10 @@ LEAST_DAMPING = 1e-15
 MOST_DAMPING = 1e12
 # An eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured there.
 LARGEST_OPEN_EIGENVALUE = 1e-14
+# Promises shrink alike where the share of one and that of the next differ by less than this.
+STEADY_SHARE = 0.2
+# No step is made longer than so many times.
+LONGEST_STEP = 10.0
 # Views are eliminated so many numbers at a time (16 MB).
 NUMBERS_AT_ONCE = 1 << 21
 # Blocks of more unknowns are not inverted, and solved so many rows at a time.
@@ -184,6 +188,7 @@ def solve(
     if not np.isfinite(sums.cost):
         return Solution(here, sums, 0, Status.NO_COST)
     damping, steps, before = _Damping(options.damping), 0, 0.0
+    pace = _Pace()
     while True:
         shared, views, promised = _damped_step(sums, damping.value, options.damp)
         if status := _ending(sums, promised, damping.value, steps, options):
@@ -197,16 +202,19 @@ def solve(
         before = 0.0
         there, trial, gained = here, sums, -np.inf
         if 0.0 < promised < np.inf:
-            there = problem.move(here, shared, views)
+            length = pace.length(promised)
+            there = problem.move(here, length * shared, length * views)
             trial = problem.linearise(there, loss)
             gained = sums.cost - trial.cost  # NaN or -inf where there is no solution
         if gained >= 0.0:
-            here, sums, before = there, trial, promised
+            here, sums, before = there, trial, promised if length == 1.0 else 0.0
             damping.loosen(gained / promised)
+            pace.took(gained / promised)
             if options.progress:
                 options.progress(steps, sums.cost)
         else:
             damping.tighten()
+            pace = _Pace()
 
 
 def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray, "k k"]:
@@ -271,6 +279,33 @@ class _Damping:
     def tighten(self) -> None:
         """After a step that was not taken."""
         self.value, self._growth = self._growth * max(self.value, 1e-12), 4.0 * self._growth
+
+
+class _Pace:
+    """How long a step is best.
+
+    In a curved valley promises shrink by the same share time after time, as each step goes as much too far,
+    or not far enough: a step that gains g times what it promised is 2 - g times as long as is best.
+    """
+
+    def __init__(self) -> None:
+        self._promises: list[float] = []
+        self._gain = 1.0
+
+    def length(self, promised: float) -> float:
+        """Of the next step, in steps as they are."""
+        self._promises.append(promised)
+        if len(self._promises) < 3:
+            return 1.0
+        first, second, third = self._promises[-3:]
+        if not (third < second and abs(third * first / second**2 - 1.0) < STEADY_SHARE and self._gain < 2.0):
+            return 1.0
+        self._promises.clear()
+        return min(1.0 / (2.0 - self._gain), LONGEST_STEP)
+
+    def took(self, gain: float) -> None:
+        """Says what the step gained, as a share of its promise."""
+        self._gain = gain
 
 
 def _ending(
