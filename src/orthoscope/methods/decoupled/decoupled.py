@@ -112,7 +112,7 @@ def decoupled(
         assumptions = (TOO_FEW,) if max(map(len, left)) > 1 else ()
     else:
         model, told = _chosen(candidates, left, judging)
-    candidates = Candidates(used, skew=skew, fitter=Kept(used, skew=skew, flats=flats, cold=fitter.cold))
+    candidates = Candidates(used, skew=skew, fitter=Kept(used, skew=skew, flats=flats, compared=fitter))
     flat = candidates.flat(model.base)
     settings = {
         "lens": model.lens,

@@ -80,12 +80,10 @@ class Evidence:
         """As a calibration kept it."""
         return cls(*variances)
 
-    def with_shape_of(self, other: Evidence) -> Evidence:
-        """With the variances of the target's shape that another fit found, but none so small that it could
-        not grow.
-        """
+    def awake(self) -> Evidence:
+        """With no variance of the target's shape so small that it could not grow."""
         least = (AWAKE_SHARE * GUESS_SHARE * self.size) ** 2
-        surface, singles = np.maximum(other.surface, least), np.maximum(other.singles, least)
+        surface, singles = np.maximum(self.surface, least), np.maximum(self.singles, least)
         return replace(
             self,
             surface=(float(surface[0]), float(surface[1])),

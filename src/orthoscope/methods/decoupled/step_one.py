@@ -21,7 +21,6 @@ from orthoscope.geometry.pose import Pose
 from orthoscope.methods.decoupled.evidence import Evidence, first_guess
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known
-from orthoscope.methods.decoupled.start import Start, nearer
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.spline import Displacement, Lattice
@@ -90,11 +89,6 @@ class StepOneFit:
         """camera_from_target of each view."""
         return self.problem.measurements.observations.poses_in_order(self.estimate.poses)
 
-    @property
-    def start(self) -> Start:
-        """For other fits to start from."""
-        return Start(self.estimate, self.evidence)
-
     def with_formula(self, camera: Camera, free: Sequence[str]) -> float:
         """For another camera in the place of the estimate's: how many parameters the data determine in
         all.
@@ -137,8 +131,7 @@ def fit_step_one(
         flat: a calibration of a flat target to start from; its parameters are freed.
         shape: of the target, `flat`, `smooth` or `free`.
         first_lens: FREE or FORMULA, the lens.
-        near: another fit of the same target to start from as far as it goes, its base, shape, lens and views
-            whatever they are.
+        near: a fit of the same model to some of the views, whose camera and target to start from.
         tolerance: of the last round.
     """
     detections, free = flat.detections, flat.uncertainty.names
@@ -146,20 +139,16 @@ def fit_step_one(
     points, seen = detections.target.points, observations.present.max(0) > 0
     parts = detections.target.parts
     basis = polynomials(points, seen, parts=parts) if shape != "flat" else np.zeros((len(points), 0))
-    start = Start(
-        DecoupledEstimate(
-            _with_displacement(flat.camera) if first_lens == FREE else flat.camera,
-            observations.poses_of(flat.camera_from_target),
-            np.zeros((basis.shape[1], SPACE)),
-            np.zeros((len(points), SPACE)),
-        ),
-        first_guess(
-            0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), flat.camera.intrinsics.fx
-        ),
+    estimate = DecoupledEstimate(
+        _with_displacement(flat.camera) if first_lens == FREE else flat.camera,
+        observations.poses_of(flat.camera_from_target),
+        np.zeros((basis.shape[1], SPACE)),
+        np.zeros((len(points), SPACE)),
     )
-    if near:
-        start = nearer(start, near.start, free_corners=shape == "free")
-    estimate, evidence = start
+    size = float(np.ptp(points[seen, :2], axis=0).max())
+    evidence = first_guess(0.5 * flat.rms_px**2, size, flat.camera.intrinsics.fx)
+    if near and near.estimate.surface.shape == estimate.surface.shape:
+        estimate, evidence = near.estimate._replace(poses=estimate.poses), near.evidence.awake()
     measurements = Measurements(observations, estimate.camera, free, corners_move=shape != "flat")
     problem = Joint(
         measurements,
