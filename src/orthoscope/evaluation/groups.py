@@ -32,7 +32,7 @@ from orthoscope.fitting.resection import resect
 from orthoscope.fitting.slopes.linearised import Linearised
 from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, leave_one_out, say_of
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
-from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
+from orthoscope.methods.decoupled.fitters import COMPARED
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.models.lenses.table import FREE
@@ -101,7 +101,7 @@ class _Cameras:
             detections=self._together.detections.only(group),
             camera_from_target=tuple(self._together.camera_from_target[i] for i in group),
         )
-        return fit_step_one(start, shape="free", first_lens=FREE, tolerance=COMPARED_TOLERANCE)
+        return fit_step_one(start, shape="free", first_lens=FREE, ending=COMPARED)
 
     def _squares(self, group: tuple[int, ...]) -> Float[ndarray, " m"]:
         """Squared error of each view by a group's camera: left out where it is of the group."""

@@ -16,17 +16,19 @@ from orthoscope.methods.decoupled.model import Model
 from orthoscope.methods.decoupled.representative import representative
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one, polished
 from orthoscope.methods.fccm import fit_flat
+from orthoscope.solve.least_squares import Options
 from orthoscope.targets.detections import Detections
 
-__all__ = ["Compared", "Fitter", "Kept", "some_of"]
+__all__ = ["COMPARED", "Compared", "Fitter", "Kept", "some_of"]
 
 # A choice needs no more than so many corners in views that are spread as widely as all.
 CHOICE_CORNERS = 12000
 # It needs so many views, however many corners they have.
 CHOICE_VIEWS = 40
-# A fit that is compared with others ends at this tolerance, a share of squared errors. At 1e-4 a formula with
-# many coefficients was not yet where five views of a fisheye foretell each other worse, and was taken.
-COMPARED_TOLERANCE = 1e-6
+# A fit that is compared with others ends at this tolerance, a share of squared errors: at 1e-4 a formula with
+# many coefficients was not yet where five views of a fisheye foretell each other worse, and was taken. What
+# is still on its way after so many steps has coefficients that the photographs do not tell.
+COMPARED = Options(tolerance=1e-6, max_steps=25)
 
 
 class Fitter(Protocol):
@@ -68,7 +70,7 @@ class Compared:
 
     def _step_one(self, model: Model) -> StepOneFit:
         flat, (_, shape, first_lens, _) = self.flat(model.base), model
-        return fit_step_one(flat, shape=shape, first_lens=first_lens, tolerance=COMPARED_TOLERANCE)
+        return fit_step_one(flat, shape=shape, first_lens=first_lens, ending=COMPARED)
 
 
 class Kept:

@@ -29,7 +29,7 @@ from orthoscope.models.target_shape import TargetShape, polynomials, without_sim
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, after_step, solve
 from orthoscope.solve.losses import Huber
 
-__all__ = ["FORMULA", "LAST_TOLERANCE", "StepOneFit", "fit_step_one", "polished"]
+__all__ = ["FORMULA", "StepOneFit", "fit_step_one", "polished"]
 
 # Beside FREE, a displacement over a formula, step 1's lens may be the formula alone, by this name.
 FORMULA = "formula"
@@ -38,8 +38,8 @@ FORMULA = "formula"
 ROUND_LIMIT = 6
 # A round ends at this tolerance.
 ROUND_TOLERANCE = 1e-3
-# The last round ends at this tolerance.
-LAST_TOLERANCE = 1e-9
+# The last round ends so where nothing else is said.
+TO_THE_LAST_DIGIT = Options(tolerance=1e-9, max_steps=50)
 # Independent errors reach so many standard deviations of a coordinate once in 3000, and count less beyond.
 FAR_DEVIATIONS = 4.0
 # Noise may change by this share before the loss does: its sums then need not be formed again.
@@ -123,7 +123,7 @@ def fit_step_one(
     shape: str,
     first_lens: str,
     near: StepOneFit | None = None,
-    tolerance: float = LAST_TOLERANCE,
+    ending: Options = TO_THE_LAST_DIGIT,
 ) -> StepOneFit:
     """Camera, poses and shape together.
 
@@ -132,7 +132,7 @@ def fit_step_one(
         shape: of the target, `flat`, `smooth` or `free`.
         first_lens: FREE or FORMULA, the lens.
         near: a fit of the same model to some of the views, whose camera and target to start from.
-        tolerance: of the last round.
+        ending: how the last round ends.
     """
     detections, free = flat.detections, flat.uncertainty.names
     observations = Observations.by_corner(detections)
@@ -173,13 +173,13 @@ def fit_step_one(
             noise, loss, place = evidence.noise, _loss(evidence.noise), None
         if evidence.agrees_with(before):
             break
-    solution = _minimised(problem, estimate, loss, tolerance)
+    solution = solve(problem, estimate, loss=loss, options=ending)
     return _told(shape, problem, solution, loss, evidence, steps)
 
 
 def polished(fit: StepOneFit) -> StepOneFit:
     """A fit that was stopped early brought to its minimum, weights as they are."""
-    solution = _minimised(fit.problem, fit.estimate, fit.loss, LAST_TOLERANCE)
+    solution = solve(fit.problem, fit.estimate, loss=fit.loss, options=TO_THE_LAST_DIGIT)
     if not solution.steps:
         return fit
     return _told(fit.target, fit.problem, solution, fit.loss, fit.evidence, fit.steps)
@@ -212,12 +212,6 @@ def _round(problem: Joint, place: _Place, loss: Huber) -> tuple[_Place, Known, F
     place = _Place(estimate, problem.measured(estimate, loss))
     known = problem.minimum(solution.sums).known
     return place, known, problem.residuals(estimate), 1 + solution.steps
-
-
-def _minimised(
-    problem: Joint, estimate: DecoupledEstimate, loss: Huber, tolerance: float
-) -> Solution[DecoupledEstimate]:
-    return solve(problem, estimate, loss=loss, options=Options(tolerance=tolerance, max_steps=50))
 
 
 def _told(
