@@ -76,8 +76,7 @@ def _sums(
         views = len(stacked)
         halves = stacked.reshape(views, POSE + 1, 2, p)
         # a corner moves its image as its view's translation does, turned into the target's frame
-        products = halves[:, SPACE:POSE, None, 0] * halves[:, None, :, 0]
-        products += halves[:, SPACE:POSE, None, 1] * halves[:, None, :, 1]  # (v, 3, 7, p)
+        products = np.einsum("vahp,vchp->vacp", halves[:, SPACE:POSE], halves)
         by_shape = (products.reshape(-1, p) @ smooth).reshape(views, SPACE, -1)
         by_shape = (
             (turn.transpose(0, 2, 1) @ by_shape).reshape(views, SPACE, POSE + 1, r).transpose(0, 3, 1, 2)
