@@ -68,7 +68,7 @@ def spline_sums(
     square = np.zeros((ny, ny, nx, nx))
     for i, j in ((y_i, y_j), (y_j, y_i)):
         square[i[:, None], j[:, None], x_i, x_j] = square[i[:, None], j[:, None], x_j, x_i] = pairs
-    return SplineSums(square.transpose(0, 2, 1, 3).reshape(g, g), *of, by)
+    return SplineSums(square.transpose(0, 2, 1, 3).reshape(g, g), of[0], of[1], by)
 
 
 def _overlapping(splines: int) -> tuple[Int[ndarray, " o"], Int[ndarray, " o"]]:
