@@ -2,8 +2,8 @@
 
 GNU's C library gives what large arrays took back to the system when they end, and asks for it again for the
 next ones, which then arrive page by page: a tenth of the time where arrays of some megabytes come and go.
-Python looks for garbage whenever some hundreds of things have been made, over all that there are: of tables of
-a thousand views as much again.
+Python looks for garbage whenever some hundreds of things have been made, over all that there are: of tables
+of a thousand views as much again.
 """
 
 from __future__ import annotations
