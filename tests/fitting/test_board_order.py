@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_views_that_were_listed_from_another_end_are_found_and_turned_back(targe
 def test_what_turned_views_give_is_what_consistent_ones_give():
     target = ALIKE["half a turn"]
     right = photographed_with(shape_of(target), NARROW, 8, target=target, noise_px=0.1, seed=2)
-    settings = {"shape": "free", "first_lens": "formula", "base": "brown"}
+    settings: dict[str, Any] = {"shape": "free", "first_lens": "formula", "base": "brown"}
     found = decoupled(listed_from_elsewhere(right, {0: 1, 2: 1, 3: 1}), **settings)
     expected = decoupled(right, **settings)
     assert found.rms_px == pytest.approx(expected.rms_px, rel=1e-4)

@@ -32,7 +32,7 @@ from orthoscope.fitting.resection import resect
 from orthoscope.fitting.slopes.linearised import Linearised
 from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, leave_one_out, say_of
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
-from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
+from orthoscope.methods.decoupled.fitters import COMPARED
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.models.lenses.table import FREE
@@ -101,7 +101,7 @@ class _Cameras:
             detections=self._together.detections.only(group),
             camera_from_target=tuple(self._together.camera_from_target[i] for i in group),
         )
-        return fit_step_one(start, shape="free", first_lens=FREE, tolerance=COMPARED_TOLERANCE)
+        return fit_step_one(start, shape="free", first_lens=FREE, ending=COMPARED)
 
     def _squares(self, group: tuple[int, ...]) -> Float[ndarray, " m"]:
         """Squared error of each view by a group's camera: left out where it is of the group."""
@@ -119,16 +119,18 @@ class _Quadratics(NamedTuple):
     score: ndarray
     told: ndarray
 
-    def at(self, change: Float[ndarray, " c"]) -> Float[ndarray, " m"]:
-        """Of each view."""
-        return 2.0 * self.score @ change + (self.told @ change) @ change
+    def at(self, change: Float[ndarray, "*s c"]) -> Float[ndarray, "*s m"]:
+        """Of each view, for each of the changes."""
+        squares = (change[..., :, None] * change[..., None, :]).reshape(*change.shape[:-1], -1)
+        return 2.0 * change @ self.score.T + squares @ self.told.reshape(len(self.told), -1).T
 
-    def lowest(self, say: Float[ndarray, " m"]) -> Float[ndarray, " c"]:
+    def lowest(self, say: Float[ndarray, "*s m"]) -> Float[ndarray, "*s c"]:
         """The change at which the sum over views, each with its say, is lowest."""
-        told = (say[:, None, None] * self.told).sum(0)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(told), 1e-300))
-        faint = 1e-9 * np.eye(len(told))
-        return -scale * np.linalg.solve(told * scale * scale[:, None] + faint, scale * (say @ self.score))
+        c = self.score.shape[1]
+        told = (say @ self.told.reshape(len(self.told), -1)).reshape(*say.shape[:-1], c, c)
+        scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=-2, axis2=-1), 1e-300))
+        system = told * scale[..., None] * scale[..., None, :] + 1e-9 * np.eye(c)
+        return -scale * np.linalg.solve(system, (scale * (say @ self.score))[..., None])[..., 0]
 
 
 def two_groups(
@@ -174,39 +176,36 @@ def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
     views = len(say.score)
     faint = 1e-9 * np.eye(say.score.shape[1]) * np.trace(say.told.mean(0))
     wishes = -np.linalg.solve(say.told + faint, say.score[..., None])[..., 0]
-    cuts = [
-        [wish > cut for cut in np.sort(wish)[FEWEST_GROUP_VIEWS - 1 : -FEWEST_GROUP_VIEWS]]
-        for wish in wishes.T
-    ]
-    rng = np.random.default_rng(0)
-    starts = [rng.random(views) < 0.5 for _ in range(RANDOM_STARTS)] + [
-        start for of_wish in cuts for start in of_wish
-    ]
-    ends = [_clustered(say, start) for start in starts]
-    ends += [min(of_wish, key=lambda second: _value(say, second)) for of_wish in cuts if of_wish]
-    able = {
-        (second ^ second[0]).tobytes(): second
-        for second in ends
-        if FEWEST_GROUP_VIEWS <= second.sum() <= views - FEWEST_GROUP_VIEWS
-    }
-    return sorted(((_value(say, second), second) for second in able.values()), key=lambda entry: entry[0])
+    cuts = [wish > np.sort(wish)[FEWEST_GROUP_VIEWS - 1 : -FEWEST_GROUP_VIEWS, None] for wish in wishes.T]
+    random = np.random.default_rng(0).random((RANDOM_STARTS, views)) < 0.5
+    best_cuts = [of_wish[_values(say, of_wish).argmin()] for of_wish in cuts]
+    ends = np.concatenate([_clustered(say, np.concatenate([random, *cuts])), best_cuts])
+    count = ends.sum(1)
+    able = ends[(count >= FEWEST_GROUP_VIEWS) & (count <= views - FEWEST_GROUP_VIEWS)]
+    distinct = list({(second ^ second[0]).tobytes(): second for second in able}.values())
+    values = _values(say, np.array(distinct, dtype=bool).reshape(-1, views)).tolist()
+    return sorted(zip(values, distinct, strict=True), key=lambda entry: entry[0])
 
 
-def _clustered(say: _Quadratics, second: Bool[ndarray, " m"]) -> Bool[ndarray, " m"]:
-    """k-means on quadratics from a start."""
+def _clustered(say: _Quadratics, second: Bool[ndarray, "s m"]) -> Bool[ndarray, "s m"]:
+    """k-means on quadratics from each of the starts."""
+    second, moving = second.copy(), np.arange(len(second))
     for _ in range(SETTLING_ROUNDS):
-        if not 1 <= second.sum() < len(second):
+        count = second[moving].sum(1)
+        moving = moving[(count >= 1) & (count < second.shape[1])]
+        tried = second[moving]
+        moved = say.at(say.lowest(tried.astype(float))) < say.at(say.lowest((~tried).astype(float)))
+        second[moving] = moved
+        moving = moving[(moved != tried).any(1)]
+        if not len(moving):
             break
-        moved = say.at(say.lowest(second.astype(float))) < say.at(say.lowest((~second).astype(float)))
-        if (moved == second).all():
-            break
-        second = moved
     return second
 
 
-def _value(say: _Quadratics, second: Bool[ndarray, " m"]) -> float:
-    """The sum of the quadratics, each at its group's lowest."""
-    return float(sum(say.at(say.lowest(group.astype(float)))[group].sum() for group in (~second, second)))
+def _values(say: _Quadratics, second: Bool[ndarray, "s m"]) -> Float[ndarray, " s"]:
+    """Of each grouping the sum of the quadratics, each at its group's lowest."""
+    groups = second.astype(float), (~second).astype(float)
+    return sum((say.at(say.lowest(group)) * group).sum(1) for group in groups)
 
 
 def _two_values(say: _Quadratics) -> Groups | None:
@@ -218,9 +217,7 @@ def _two_values(say: _Quadratics) -> Groups | None:
     likely = np.zeros(share.shape[1])
     for _ in range(SETTLING_ROUNDS):
         weight = np.maximum(share.mean(1), 1e-6)
-        each = np.stack(
-            [np.log(w) - 0.5 * say.at(say.lowest(part)) for w, part in zip(weight, share, strict=True)]
-        )
+        each = np.log(weight)[:, None] - 0.5 * say.at(say.lowest(share))
         likely = np.logaddexp(*each)
         share = np.exp(each - likely)
     if likely.sum() - _likelihood_of_spread(say) < LEAST_LOG_RATIO:

@@ -46,7 +46,7 @@ def likely_turns(
     pulls, told, square = _sums(flat, smooth)
     freedom = 2 * flat.detections.corners - POSE * len(pulls) - len(flat.uncertainty.names)
     noise = square / max(freedom, 1)
-    mean = sum(turned.T @ told @ turned for turned in shown) / len(shown)
+    mean = np.mean([turned.T @ told @ turned for turned in shown], axis=0)
     roots = np.linalg.inv(np.linalg.cholesky(mean + noise * prior * np.eye(len(mean))))
     heard = np.stack([pulls @ turned @ roots.T for turned in shown])  # (g, m, c): their squares are gains
     starts = np.argsort(-(pulls**2).sum(1), kind="stable")[:START_VIEWS]
@@ -55,7 +55,7 @@ def likely_turns(
         before, turns = turns, (heard @ sums.T).argmax(0).T
         if (turns == before).all():
             break
-        sums = sum((turns == i) @ of_turn for i, of_turn in enumerate(heard))
+        sums = np.sum([(turns == i) @ of_turn for i, of_turn in enumerate(heard)], axis=0)
     gains = (sums**2).sum(1)
     best = int(gains.argmax())
     return turns[best], float(gains[best] - (heard[0].sum(0) ** 2).sum()), noise
@@ -76,8 +76,7 @@ def _sums(
         views = len(stacked)
         halves = stacked.reshape(views, POSE + 1, 2, p)
         # a corner moves its image as its view's translation does, turned into the target's frame
-        products = halves[:, SPACE:POSE, None, 0] * halves[:, None, :, 0]
-        products += halves[:, SPACE:POSE, None, 1] * halves[:, None, :, 1]  # (v, 3, 7, p)
+        products = np.einsum("vahp,vchp->vacp", halves[:, SPACE:POSE], halves)
         by_shape = (products.reshape(-1, p) @ smooth).reshape(views, SPACE, -1)
         by_shape = (
             (turn.transpose(0, 2, 1) @ by_shape).reshape(views, SPACE, POSE + 1, r).transpose(0, 3, 1, 2)

@@ -200,7 +200,7 @@ def solve(
                 problem.move(here, shared, views), _lowered(sums, promised), steps, Status.CONVERGED
             )
         before = 0.0
-        there, trial, gained = here, sums, -np.inf
+        there, trial, gained, length = here, sums, -np.inf, 1.0
         if 0.0 < promised < np.inf:
             length = pace.length(promised)
             there = problem.move(here, length * shared, length * views)

@@ -28,6 +28,7 @@ from orthoscope.evaluation.metrics import lateral_errors, normalised_calibration
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import CalibrationError, InputError
+from orthoscope.methods.decoupled.candidates import Candidates
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.decoupled.model import BASES
 from orthoscope.methods.fccm import fccm
@@ -212,6 +213,16 @@ def test_out_of_several_formulas_the_one_that_foresees_best_is_taken(noisy: Dete
     }
     only = decoupled(noisy, shape="free", first_lens="formula", formulas=("division",))
     assert isinstance(only.camera.lens, Division)
+
+
+def test_a_base_whose_fit_was_stopped_on_its_way_is_left_to_those_that_arrived(
+    noisy: Detections, found: Calibration, monkeypatch: pytest.MonkeyPatch
+):
+    first = found.settings["base"]
+    monkeypatch.setattr(Candidates, "has_arrived", lambda _, model: model.base != first)
+    assert decoupled(noisy).settings["base"] != first
+    monkeypatch.setattr(Candidates, "has_arrived", lambda *_: False)  # then each is as good as the others
+    assert decoupled(noisy).settings["base"] == first
 
 
 def test_progress_counts_to_the_end(noisy: Detections):

@@ -16,6 +16,7 @@ docs/measured/choice.md.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -112,7 +113,7 @@ def decoupled(
         assumptions = (TOO_FEW,) if max(map(len, left)) > 1 else ()
     else:
         model, told = _chosen(candidates, left, judging)
-    candidates = Candidates(used, skew=skew, fitter=Kept(used, skew=skew, flats=flats, cold=fitter.cold))
+    candidates = Candidates(used, skew=skew, fitter=Kept(used, skew=skew, flats=flats, compared=fitter))
     flat = candidates.flat(model.base)
     settings = {
         "lens": model.lens,
@@ -193,7 +194,7 @@ def _chosen(
 
     if len(of_base) > 1:
         fitting = [model for model in of_base if _can_be_fitted(candidates, model.base)] or of_base[:1]
-        base = fitting[first_as_good(judge(fitting), corners)].base
+        base = fitting[first_as_good(_arrived(judge(fitting), candidates, fitting), corners)].base
     else:
         base = left.bases[0]
     models = _ends(base, left)
@@ -206,6 +207,20 @@ def _chosen(
     listed = list(tried)
     told = judged(list(tried.values()), corners, listed.index(model)) if model in tried else ()
     return model, told
+
+
+def _arrived(
+    contenders: Sequence[Contender], candidates: Candidates, models: Sequence[Model]
+) -> list[Contender]:
+    """The contenders; what is foreseen by a fit that was stopped on its way counts for nothing beside those
+    that have arrived: with other roundings it would be elsewhere.
+    """
+    arrived = [candidates.has_arrived(model) for model in models]
+    nothing = np.full_like(contenders[0].squares, np.nan)
+    return [
+        contender if there or not any(arrived) else replace(contender, squares=nothing)
+        for contender, there in zip(contenders, arrived, strict=True)
+    ]
 
 
 def _ends(base: str, left: _Open) -> list[Model]:

@@ -27,7 +27,6 @@ from orthoscope.fitting.reprojection import POSE
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.normal_equations import SPACE, spline_unknowns
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known, Precisions
-from orthoscope.models.target_shape import polynomials
 from orthoscope.solve.losses import Loss
 
 __all__ = ["Evidence", "first_guess"]
@@ -47,8 +46,6 @@ LEAST_BEND = 1e-8
 MOST_BEND = 0.1
 # Noise and parameters may still change by this share.
 SETTLED_SHARE = 0.01
-# The patterns have these orders: a pose takes those below, and waves are single corners' matter.
-SMOOTH_ORDERS = (2, 3, 4)
 # Without noise the squares that are left count as so much, px^2.
 LEAST_SQUARES = 1e-24
 PLANE, HEIGHT = slice(None, 2), slice(2, None)
@@ -83,12 +80,10 @@ class Evidence:
         """As a calibration kept it."""
         return cls(*variances)
 
-    def with_shape_of(self, other: Evidence) -> Evidence:
-        """With the variances of the target's shape that another fit found, but none so small that it could
-        not grow.
-        """
+    def awake(self) -> Evidence:
+        """With no variance of the target's shape so small that it could not grow."""
         least = (AWAKE_SHARE * GUESS_SHARE * self.size) ** 2
-        surface, singles = np.maximum(other.surface, least), np.maximum(other.singles, least)
+        surface, singles = np.maximum(self.surface, least), np.maximum(self.singles, least)
         return replace(
             self,
             surface=(float(surface[0]), float(surface[1])),
@@ -165,9 +160,8 @@ def _likeness(problem: Joint, residuals: Float[ndarray, "m p 2"], noise: float) 
     """Mean square of smooth patterns in the residuals of a view, over what independent errors of this
     variance would give.
     """
-    seen = problem.measurements.observations.present
-    patterns = polynomials(problem.points, seen.max(0) > 0, orders=SMOOTH_ORDERS, parts=problem.parts)
-    found = np.einsum("pr,mpa->mra", patterns, residuals)
+    seen, patterns = problem.measurements.observations.present, problem.smooth_patterns
+    found = np.tensordot(residuals, patterns, axes=(1, 0))
     expected = noise * (seen @ patterns**2)
     return max(1.0, float((found**2).sum() / (2.0 * expected.sum())))
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from orthoscope.fitting.observations import Chunk, Observations, Poses
 from orthoscope.fitting.reprojection import POSE, Estimate, Places, Reprojection
-from orthoscope.fitting.slopes.residual_slopes import by_corner, splines_along
+from orthoscope.fitting.slopes.residual_slopes import splines_along
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.decoupled.spline_sums import SplineSums, spline_sums
 from orthoscope.models.camera import Camera
@@ -113,11 +113,7 @@ class Measurements:
                 part, root = self._weigh(stacked, chunk, loss)
                 cost += part
                 _add_camera_and_poses(sums, stacked, chunk.rows, k)
-                turned = (
-                    by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows])
-                    if self.corners_move
-                    else None
-                )
+                turned = _turned(stacked, poses.rotation[chunk.rows], k) if self.corners_move else None
                 if turned is not None:
                     _add_corners(sums, stacked, turned, chunk.rows, k)
                 if isinstance(camera.lens, FreeLens):
@@ -181,14 +177,20 @@ def _add_camera_and_poses(sums: MeasurementSums, stacked: ndarray, rows: slice, 
     sums.zv[rows, :k], sums.vv[rows], sums.v[rows] = gram[:, :k, k:-1], gram[:, k:-1, k:-1], gram[:, k:-1, -1]
 
 
-def _add_corners(sums: MeasurementSums, stacked: ndarray, turned: ndarray, rows: slice, k: int) -> None:
-    views, columns, _ = stacked.shape
-    of_corner = stacked.reshape(views, columns, 2, -1).transpose(0, 3, 2, 1)  # (views, n, 2, columns)
-    products = turned @ of_corner
-    sums.zc[:, :k] += products[..., :k].sum(0).transpose(0, 2, 1)
-    sums.cc[:] += (turned @ turned.transpose(0, 1, 3, 2)).sum(0)
-    sums.c[:] += products[..., -1].sum(0)
-    sums.vc[rows] = products[..., k:-1].transpose(0, 1, 3, 2)
+def _turned(stacked: ndarray, rotation: ndarray, k: int) -> Float[ndarray, "v 3 2 p"]:
+    """d(u, v) by the place of each corner in the target's frame."""
+    by_place = rotation.transpose(0, 2, 1) @ stacked[:, k + SPACE : k + POSE]
+    return by_place.reshape(len(stacked), SPACE, 2, -1)
+
+
+def _add_corners(
+    sums: MeasurementSums, stacked: ndarray, turned: Float[ndarray, "v 3 2 p"], rows: slice, k: int
+) -> None:
+    halves = stacked.reshape(*stacked.shape[:2], 2, -1)
+    sums.zc[:, :k] += np.einsum("vahp,vchp->acp", turned, halves[:, :k]).transpose(2, 1, 0)
+    sums.cc[:] += np.einsum("vahp,vbhp->abp", turned, turned).transpose(2, 0, 1)
+    sums.c[:] += np.einsum("vahp,vhp->ap", turned, halves[:, -1]).T
+    sums.vc[rows] = np.einsum("vahp,vchp->vacp", turned, halves[:, k:-1]).transpose(0, 3, 2, 1)
 
 
 def _add_spline(sums: MeasurementSums, found: SplineSums, rows: slice, k: int, frame: Intrinsics) -> None:
@@ -206,6 +208,7 @@ def _add_spline(sums: MeasurementSums, found: SplineSums, rows: slice, k: int, f
         sums.zz[:k, columns] += with_camera.T
         sums.z[columns] += products[:, :, -1].sum(0)
         sums.zv[rows, columns] = products[:, :, k:-1]
-    if len(found.by_u):
-        sums.zc[:, x] += frame.fx * found.by_u
-        sums.zc[:, y] += frame.fy * found.by_v + frame.skew * found.by_u
+    if len(found.by_place):
+        by_u, by_v = found.by_place
+        sums.zc[:, x] += frame.fx * by_u.transpose(2, 0, 1)
+        sums.zc[:, y] += (frame.fy * by_v + frame.skew * by_u).transpose(2, 0, 1)

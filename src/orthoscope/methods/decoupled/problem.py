@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.spline import Displacement
 from orthoscope.models.parameters import Parameters
-from orthoscope.models.target_shape import WHOLE
+from orthoscope.models.target_shape import WHOLE, polynomials
 from orthoscope.solve.least_squares import (
     NormalEquations,
     blocks_times,
@@ -42,6 +43,9 @@ from orthoscope.solve.losses import Loss
 from orthoscope.solve.positive import positive_inverse
 
 __all__ = ["DecoupledEstimate", "Joint", "Known", "Minimum", "Precisions"]
+
+# Smooth patterns have these orders: a pose takes those below, and waves are single corners' matter.
+PATTERN_ORDERS = (2, 3, 4)
 
 
 class DecoupledEstimate(NamedTuple):
@@ -122,6 +126,12 @@ class Joint:
         self._n = len(free) + 2 * len(energy) + SPACE * surface.shape[1]
         views = len(measurements.observations.order)
         self.by_corner = single and SPACE * len(points) >= POSE * views
+
+    @cached_property
+    def smooth_patterns(self) -> Float[ndarray, "p c"]:
+        """Over the corners that were seen: what alike errors of a view follow."""
+        seen = self.measurements.observations.present.max(0) > 0
+        return polynomials(self.points, seen, orders=PATTERN_ORDERS, parts=self.parts)
 
     def corners(self, unknowns: DecoupledEstimate) -> Float[ndarray, "p 3"]:
         """Where the target's corners are."""

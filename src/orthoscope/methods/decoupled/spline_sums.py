@@ -27,22 +27,21 @@ class SplineSums(NamedTuple):
     Attributes:
         square: (g,g) with each other.
         of_u, of_v: (v,g,c) with the columns of a stack, its rows for u and those for v, of each view.
-        by_u, by_v: (p,g,3) with the slopes of u and v by the places of corners, over views; none where no
+        by_place: (2,g,3,p) with the slopes of u and of v by the places of corners, over views; none where no
             slopes were given.
     """
 
     square: Float[ndarray, "g g"]
     of_u: Float[ndarray, "v g c"]
     of_v: Float[ndarray, "v g c"]
-    by_u: Float[ndarray, "p g 3"]
-    by_v: Float[ndarray, "p g 3"]
+    by_place: Float[ndarray, "h g 3 p"]
 
 
 def spline_sums(
     across: Float[ndarray, "v p nx"],
     down: Float[ndarray, "v p ny"],
     stacked: Float[ndarray, "v c rows"],
-    slopes: Float[ndarray, "v p 3 2"] | None = None,
+    slopes: Float[ndarray, "v 3 2 p"] | None = None,
 ) -> SplineSums:
     """The sums.
 
@@ -53,7 +52,7 @@ def spline_sums(
     """
     (views, corners, nx), ny, columns = across.shape, down.shape[2], stacked.shape[1]
     g, halves = nx * ny, stacked.reshape(views, columns, 2, corners)
-    of, by = np.empty((2, views, g, columns)), np.zeros((2, 0 if slopes is None else corners, g, 3))
+    of, by = np.empty((2, views, g, columns)), np.zeros((0 if slopes is None else 2, g, 3, corners))
     (x_i, x_j), (y_i, y_j) = _overlapping(nx), _overlapping(ny)
     pairs = np.zeros((len(y_i), len(x_i)))
     at_once = max(1, VALUES_AT_ONCE // max(corners * g, 1))
@@ -65,11 +64,11 @@ def spline_sums(
         for half in (0, 1):
             of[half, some] = values @ halves[some, :, half].transpose(0, 2, 1)
             if slopes is not None:
-                by[half] += values.transpose(2, 1, 0) @ slopes[some, ..., half].transpose(1, 0, 2)
+                by[half] += np.einsum("vgp,vap->gap", values, slopes[some, :, half])
     square = np.zeros((ny, ny, nx, nx))
     for i, j in ((y_i, y_j), (y_j, y_i)):
         square[i[:, None], j[:, None], x_i, x_j] = square[i[:, None], j[:, None], x_j, x_i] = pairs
-    return SplineSums(square.transpose(0, 2, 1, 3).reshape(g, g), *of, *by)
+    return SplineSums(square.transpose(0, 2, 1, 3).reshape(g, g), of[0], of[1], by)
 
 
 def _overlapping(splines: int) -> tuple[Int[ndarray, " o"], Int[ndarray, " o"]]:

@@ -21,7 +21,6 @@ from orthoscope.geometry.pose import Pose
 from orthoscope.methods.decoupled.evidence import Evidence, first_guess
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known
-from orthoscope.methods.decoupled.start import Start, nearer
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.spline import Displacement, Lattice
@@ -30,7 +29,7 @@ from orthoscope.models.target_shape import TargetShape, polynomials, without_sim
 from orthoscope.solve.least_squares import NormalEquations, Options, Solution, after_step, solve
 from orthoscope.solve.losses import Huber
 
-__all__ = ["FORMULA", "LAST_TOLERANCE", "StepOneFit", "fit_step_one", "polished"]
+__all__ = ["FORMULA", "StepOneFit", "fit_step_one", "polished"]
 
 # Beside FREE, a displacement over a formula, step 1's lens may be the formula alone, by this name.
 FORMULA = "formula"
@@ -39,8 +38,8 @@ FORMULA = "formula"
 ROUND_LIMIT = 6
 # A round ends at this tolerance.
 ROUND_TOLERANCE = 1e-3
-# The last round ends at this tolerance.
-LAST_TOLERANCE = 1e-9
+# The last round ends so where nothing else is said.
+TO_THE_LAST_DIGIT = Options(tolerance=1e-9, max_steps=50)
 # Independent errors reach so many standard deviations of a coordinate once in 3000, and count less beyond.
 FAR_DEVIATIONS = 4.0
 # Noise may change by this share before the loss does: its sums then need not be formed again.
@@ -90,11 +89,6 @@ class StepOneFit:
         """camera_from_target of each view."""
         return self.problem.measurements.observations.poses_in_order(self.estimate.poses)
 
-    @property
-    def start(self) -> Start:
-        """For other fits to start from."""
-        return Start(self.estimate, self.evidence)
-
     def with_formula(self, camera: Camera, free: Sequence[str]) -> float:
         """For another camera in the place of the estimate's: how many parameters the data determine in
         all.
@@ -129,7 +123,7 @@ def fit_step_one(
     shape: str,
     first_lens: str,
     near: StepOneFit | None = None,
-    tolerance: float = LAST_TOLERANCE,
+    ending: Options = TO_THE_LAST_DIGIT,
 ) -> StepOneFit:
     """Camera, poses and shape together.
 
@@ -137,29 +131,24 @@ def fit_step_one(
         flat: a calibration of a flat target to start from; its parameters are freed.
         shape: of the target, `flat`, `smooth` or `free`.
         first_lens: FREE or FORMULA, the lens.
-        near: another fit of the same target to start from as far as it goes, its base, shape, lens and views
-            whatever they are.
-        tolerance: of the last round.
+        near: a fit of the same model to some of the views, whose camera and target to start from.
+        ending: how the last round ends.
     """
     detections, free = flat.detections, flat.uncertainty.names
     observations = Observations.by_corner(detections)
     points, seen = detections.target.points, observations.present.max(0) > 0
     parts = detections.target.parts
     basis = polynomials(points, seen, parts=parts) if shape != "flat" else np.zeros((len(points), 0))
-    start = Start(
-        DecoupledEstimate(
-            _with_displacement(flat.camera) if first_lens == FREE else flat.camera,
-            observations.poses_of(flat.camera_from_target),
-            np.zeros((basis.shape[1], SPACE)),
-            np.zeros((len(points), SPACE)),
-        ),
-        first_guess(
-            0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), flat.camera.intrinsics.fx
-        ),
+    estimate = DecoupledEstimate(
+        _with_displacement(flat.camera) if first_lens == FREE else flat.camera,
+        observations.poses_of(flat.camera_from_target),
+        np.zeros((basis.shape[1], SPACE)),
+        np.zeros((len(points), SPACE)),
     )
-    if near:
-        start = nearer(start, near.start, free_corners=shape == "free")
-    estimate, evidence = start
+    size = float(np.ptp(points[seen, :2], axis=0).max())
+    evidence = first_guess(0.5 * flat.rms_px**2, size, flat.camera.intrinsics.fx)
+    if near and near.estimate.surface.shape == estimate.surface.shape:
+        estimate, evidence = near.estimate._replace(poses=estimate.poses), near.evidence.awake()
     measurements = Measurements(observations, estimate.camera, free, corners_move=shape != "flat")
     problem = Joint(
         measurements,
@@ -184,13 +173,13 @@ def fit_step_one(
             noise, loss, place = evidence.noise, _loss(evidence.noise), None
         if evidence.agrees_with(before):
             break
-    solution = _minimised(problem, estimate, loss, tolerance)
+    solution = solve(problem, estimate, loss=loss, options=ending)
     return _told(shape, problem, solution, loss, evidence, steps)
 
 
 def polished(fit: StepOneFit) -> StepOneFit:
     """A fit that was stopped early brought to its minimum, weights as they are."""
-    solution = _minimised(fit.problem, fit.estimate, fit.loss, LAST_TOLERANCE)
+    solution = solve(fit.problem, fit.estimate, loss=fit.loss, options=TO_THE_LAST_DIGIT)
     if not solution.steps:
         return fit
     return _told(fit.target, fit.problem, solution, fit.loss, fit.evidence, fit.steps)
@@ -223,12 +212,6 @@ def _round(problem: Joint, place: _Place, loss: Huber) -> tuple[_Place, Known, F
     place = _Place(estimate, problem.measured(estimate, loss))
     known = problem.minimum(solution.sums).known
     return place, known, problem.residuals(estimate), 1 + solution.steps
-
-
-def _minimised(
-    problem: Joint, estimate: DecoupledEstimate, loss: Huber, tolerance: float
-) -> Solution[DecoupledEstimate]:
-    return solve(problem, estimate, loss=loss, options=Options(tolerance=tolerance, max_steps=50))
 
 
 def _told(
