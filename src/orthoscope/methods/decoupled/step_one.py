@@ -203,9 +203,8 @@ def _round(problem: Joint, place: _Place, loss: Huber) -> tuple[_Place, Known, F
     residuals = problem.residuals(there)
     cost = problem.cost(there, loss, residuals)
     if abs(cost - (sums.cost - step.promised)) <= ROUND_TOLERANCE * cost:
-        return (
-            _Place(there, after_step(place.sums, step.shared, step.blocks)), step.known, residuals, 1,
-        )  # fmt: skip
+        after = _Place(there, after_step(place.sums, step.shared, step.blocks))
+        return after, step.known, residuals, 1
     start = there if cost < sums.cost else place.estimate
     solution = solve(problem, start, loss=loss, options=Options(tolerance=ROUND_TOLERANCE, max_steps=50))
     estimate = solution.unknowns
