@@ -78,7 +78,7 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
         scatter,
         seen,
         distance=distance,
-        richest=richest.scatter if own else None,
+        richest=richest.scatter if richest.scatter is not scatter else None,
         poorer=richest.poorer,
         judged=calibration.camera,
         corners=pixels,

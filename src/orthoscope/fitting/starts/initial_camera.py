@@ -245,7 +245,7 @@ def starts(
         CalibrationError: the corners fit no camera, or lie where the wanted lens cannot see.
     """
     coefficients = lens.free if coefficients is None else coefficients
-    if lens.chart is GNOMONIC and bases.pinhole is not None and bases.pinhole_fits:
+    if bases.pinhole is not None and bases.pinhole_fits:
         return _with_lens(bases, bases.pinhole, lens, coefficients)
     found: list[Estimate] = []
     for base in sorted((base for base in (bases.angle, bases.pinhole) if base is not None), key=bases.misfit):

@@ -87,6 +87,12 @@ class Lattice:
         """How many there are."""
         return self.shape[0] * self.shape[1]
 
+    def reaches(self, x: ndarray, y: ndarray) -> ndarray:
+        """Whether some spline is not zero at places of any shape (...)."""
+        low = self.origin - (SPLINES_ACROSS_CELL - 1) * self.step
+        high = self.origin + self.shape * self.step
+        return (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1])
+
     def design(self, x: ndarray, y: ndarray) -> ndarray:
         """The value of every spline at places of any shape (...): (..., splines), y-major."""
         across, down = self.along(x, 0), self.along(y, 1)
@@ -177,6 +183,15 @@ class Displacement:
 
     def at(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray, ndarray]:
         """s, ds/dx and ds/dy at places of any shape (...), each (..., 2)."""
+        near = self.lattice.reaches(x, y)
+        if near.all():
+            return self._at(x, y)
+        out = np.zeros((3, *x.shape, 2))
+        out[:, near] = self._at(x[near], y[near])
+        return out[0], out[1], out[2]
+
+    def _at(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray, ndarray]:
+        """The same, of places that the lattice reaches."""
         across, down = self.lattice.along(x, 0), self.lattice.along(y, 1)
         across_slopes, down_slopes = self.lattice.slopes_along(x, 0), self.lattice.slopes_along(y, 1)
         out = np.empty((3, *x.shape, 2))
