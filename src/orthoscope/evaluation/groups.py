@@ -204,8 +204,11 @@ def _clustered(say: _Quadratics, second: Bool[ndarray, "s m"]) -> Bool[ndarray, 
 
 def _values(say: _Quadratics, second: Bool[ndarray, "s m"]) -> Float[ndarray, " s"]:
     """Of each grouping the sum of the quadratics, each at its group's lowest."""
-    groups = second.astype(float), (~second).astype(float)
-    return sum((say.at(say.lowest(group)) * group).sum(1) for group in groups)
+    first, other = (
+        (say.at(say.lowest(group)) * group).sum(1)
+        for group in (second.astype(float), (~second).astype(float))
+    )
+    return first + other
 
 
 def _two_values(say: _Quadratics) -> Groups | None:

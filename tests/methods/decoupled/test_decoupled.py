@@ -182,7 +182,9 @@ def test_whatever_is_settled_beforehand_is_kept_and_gives_the_same_again(noisy: 
 def test_the_same_photographs_give_the_same_choice_to_the_last_bit(noisy: Detections):
     one, other = (decoupled(noisy.only(range(6))) for _ in range(2))
     assert_same(one, other)
-    assert one.candidates == other.candidates
+    assert repr(one.candidates) == repr(
+        other.candidates
+    )  # NaN, where a fit did not arrive, is no equal of itself
 
 
 @pytest.mark.slow

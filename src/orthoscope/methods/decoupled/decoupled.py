@@ -194,7 +194,9 @@ def _chosen(
 
     if len(of_base) > 1:
         fitting = [model for model in of_base if _can_be_fitted(candidates, model.base)] or of_base[:1]
-        base = fitting[first_as_good(_arrived(judge(fitting), candidates, fitting), corners)].base
+        arrived = _arrived(judge(fitting), candidates, fitting)
+        tried |= zip(fitting, arrived, strict=True)
+        base = fitting[first_as_good(arrived, corners)].base
     else:
         base = left.bases[0]
     models = _ends(base, left)
