@@ -9,7 +9,7 @@ lens is of another kind, and then turned into it (lens_fit).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -235,8 +235,9 @@ class StartingCameras:
 
 def starts(
     bases: StartingCameras, lens: type[Formula], *, coefficients: Sequence[str] | None = None
-) -> list[Estimate]:
-    """Where to start from to get a camera with the wanted lens, the likelier first.
+) -> Iterator[Estimate]:
+    """Where to start from to get a camera with the wanted lens, the likelier first, each made when it is
+    asked for.
 
     Args:
         coefficients: those that will move, by default what the lens frees; the others have their usual
@@ -246,21 +247,24 @@ def starts(
     """
     coefficients = lens.free if coefficients is None else coefficients
     if bases.pinhole is not None and bases.pinhole_fits:
-        return _with_lens(bases, bases.pinhole, lens, coefficients)
-    found: list[Estimate] = []
+        yield from _with_lens(bases, bases.pinhole, lens, coefficients)
+        return
+    found = False
     for base in sorted((base for base in (bases.angle, bases.pinhole) if base is not None), key=bases.misfit):
         try:
-            found += _with_lens(bases, base, lens, coefficients)
+            with_lens = _with_lens(bases, base, lens, coefficients)
         except CalibrationError:
             if not found:  # the likeliest base says that the lens cannot see these corners
                 raise
+            continue
+        yield from with_lens
+        found = True
     if not found:
         raise CalibrationError(
             "the corners fit no camera at all: neither a pin-hole nor a fisheye sees them as images of a flat"
             " target. Check that the target's columns and rows are right and that the corners are listed in"
             " order."
         )
-    return found
 
 
 def starts_elsewhere(
