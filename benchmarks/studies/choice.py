@@ -1,23 +1,20 @@
 """Rules of choice beside each other, where the true camera is known: boards, poses and noise like real ones.
 
-    ORTHOSCOPE_DATASETS=photographs python -m benchmarks.studies.choice 60 [alike]
+    ORTHOSCOPE_DATASETS=photographs python -m benchmarks.studies.choice 150 [--only alike]
+    python -m benchmarks.studies.choice 100 --independent
 
-Worlds are fits of real sets, taken as truth: poses, which corners were seen, the camera (its free lens or its
-formula) and the board's shape.
-From these, photographs with white noise, and in each case something more: `board` a stretch and a sag,
-`alike` errors alike within a view, `bend` a board that bends from view to view, `breath` a focal length that
-breathes, `rolling` rows that shear.  Every base, shape and lens is fitted; printed is, for each rule, the
-true camera error of what it takes over that of the best base, shape and lens, with the mean's standard error.
-The best of eighteen is lucky, and nobody can know it: beside the rules stand the very model that the
-photographs were made by, the entry that is best over all sets, and each rule over the first of these.
+Photographs are those of resimulated.py, or of independent.py.  Every base, shape and lens is fitted; printed
+is, for each rule, the true camera error of what it takes over that of the best in its own table, which is all
+that it tries, and over the best of all eighteen, with the mean's standard error, and the error itself.  The
+best of many is lucky, and nobody can know it: beside the rules stand the very model that the photographs were
+made by, and the entry that is best over all sets.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
@@ -25,9 +22,11 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.real_sets import classic_corners
+from benchmarks.studies.independent import recipe_for
+from benchmarks.studies.resimulated import WORLDS, drawn
+from benchmarks.studies.worlds import made, true_error
 from orthoscope.evaluation.camera_error import predicted_error, rms_difference, seen_places
 from orthoscope.geometry.arrays import CalibrationError
-from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.decoupled.candidates import Candidates, Model
 from orthoscope.methods.decoupled.model import BASES
 from orthoscope.methods.decoupled.model_selection import (
@@ -37,19 +36,30 @@ from orthoscope.methods.decoupled.model_selection import (
     simplest_as_good,
 )
 from orthoscope.models.camera import Camera
-from orthoscope.models.target_shape import SHAPES, polynomials
+from orthoscope.models.target_shape import SHAPES
 from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import chessboard
 
-WORLDS = {
-    "opencv-left": "brown",
-    "udacity": "brown",
-    "sony": "brown",
-    "calibrel": "brown",
-    "fisheye-180": "kannala_brandt",
-}
-CASES = ("perfect", "board", "alike", "bend", "breath", "rolling")
-ALIKE = {2: 12.0, 3: 4.0, 4: 1.8}  # times independent noise, by the order of a pattern over the board
 MODELS = list(product(SHAPES, ("formula", "free")))
+SIMPLEST, RICHEST = MODELS[0], MODELS[-1]
+FEWEST_VIEWS = 4
+# Groups that are told of one by one.
+VIEWS = ((4, 6), (7, 10), (11, 40), (8, 40))
+
+
+class Set(NamedTuple):
+    """Photographs and their truth.
+
+    Attributes:
+        case: what was wrong, or the kind of lens.
+        off: how far a camera is from the true one at some pixels of its image, rms px.
+        model: that the photographs were made by; None where it is none of the project's.
+    """
+
+    case: str
+    photographs: Detections
+    off: Callable[[Camera, np.ndarray], float]
+    model: Model | None
 
 
 class Tried(NamedTuple):
@@ -64,66 +74,42 @@ class Tried(NamedTuple):
     predicted: float
     true: float
 
-
-def drawn(
-    detections: Detections, base: str, rng: np.random.Generator
-) -> tuple[str, Detections, Model, Candidates]:
-    """One set of photographs of a world: the case, the photographs, and the truth's model among its
-    candidates.
-    """
-    world = Candidates(detections, skew=False)
-    truth = Model(base, "free", "free" if rng.uniform() < 0.6 else "formula")
-    fit, case = world.step_one(truth), CASES[rng.integers(len(CASES))]
-    points, camera = detections.target.points, fit.estimate.camera
-    seen, size = np.ones(len(points), dtype=bool), float(np.ptp(points[:, :2]))
-    shape = np.zeros_like(points)
-    if case != "perfect":
-        shape = fit.shape.displacements.copy()
-        middle, (a, b, c) = points - points.mean(0), rng.normal(0.0, 0.0014, 3)
-        shape[:, 0] += a * middle[:, 0] + b * middle[:, 1]
-        shape[:, 1] += c * middle[:, 1]
-    patterns = {order: polynomials(points, seen, orders=(order,)) for order in ALIKE}
-    sigma = float(np.clip(np.sqrt(fit.evidence.noise), 0.03, 0.15))
-    views, chosen = [], rng.permutation(len(detections.views))[: int(rng.choice([5, 8, 15, 30]))]
-    for number, i in enumerate(chosen):
-        ids, rotation = detections.views[i].ids, fit.estimate.poses.rotation[i]
-        translation = fit.estimate.poses.translation[i]
-        turned = rotation_from_vector(rng.normal(0.0, 0.04, (1, 3)))[0] @ rotation
-        middle = rotation @ points.mean(0) + translation
-        translation = middle * rng.uniform(0.93, 1.07) - turned @ points.mean(0)
-        bent, lens = shape.copy(), camera
-        if case == "bend":
-            bent[:, 2] += patterns[2] @ rng.normal(0.0, 0.0006 * size, patterns[2].shape[1])
-        if case == "breath":
-            K, larger = camera.intrinsics, 1.0 + rng.normal(0.0, 0.003)
-            lens = replace(camera, intrinsics=replace(K, fx=larger * K.fx, fy=larger * K.fy))
-        pixels = lens.project(((points + bent) @ turned.T + translation)[ids])
-        if case == "rolling":
-            pixels = pixels + np.outer(pixels[:, 1] - camera.intrinsics.cy, rng.normal(0.0, 1e-3, 2))
-        pixels = pixels + sigma * rng.standard_normal(pixels.shape)
-        if case == "alike":
-            for order, tau in ALIKE.items():
-                rows = patterns[order][ids] / np.sqrt(len(ids))
-                pixels = pixels + rows @ rng.normal(0.0, sigma * np.sqrt(tau - 1.0), (rows.shape[1], 2))
-        size_px = np.array(detections.image_size, dtype=float)
-        inside = np.isfinite(pixels).all(1) & (pixels > -0.5).all(1) & (pixels < size_px - 0.5).all(1)
-        if inside.sum() >= max(8, len(ids) // 2):
-            views.append(View(f"{number:02d}", ids[inside], pixels[inside]))
-    return case, Detections(detections.target, detections.image_size, tuple(views)), truth, world
+    @property
+    def kind(self) -> tuple[str, str]:
+        """Shape and lens, whatever the base."""
+        return self.model.shape, self.model.first_lens
 
 
-def tried(photographs: Detections, truth: Model, world: Candidates) -> list[Tried]:
+def resimulated(folder: Path, seed: int) -> Set:
+    """Photographs like those of a real set."""
+    rng = np.random.default_rng(seed)
+    name = list(WORLDS)[rng.integers(len(WORLDS))]
+    case, photographs, model, world = drawn(classic_corners(folder, name), WORLDS[name], rng)
+    true = world.camera(model)[0]
+    return Set(case, photographs, lambda camera, seen: rms_difference(camera, true, seen), model)
+
+
+def independent(seed: int) -> Set:
+    """Photographs by a camera that is not this project's."""
+    name, recipe = recipe_for(seed)
+    world = made(recipe, seed)
+    views = tuple(View(photo.image, photo.ids, photo.pixels) for photo in world.photographs)
+    photographs = Detections(chessboard(*recipe.board), recipe.camera.size, views)
+    return Set(name, photographs, lambda camera, at: true_error(world, at, camera.unproject(at)), None)
+
+
+def tried(of: Set) -> list[Tried]:
     """Every model of every base that can be fitted."""
-    candidates, true = Candidates(photographs, skew=False), world.camera(truth)[0]
-    seen, found = seen_places(np.concatenate([view.pixels for view in photographs.views])), []
+    candidates = Candidates(of.photographs, skew=False)
+    seen, found = seen_places(np.concatenate([view.pixels for view in of.photographs.views])), []
     for base in BASES:
         try:
             candidates.flat(base)
         except CalibrationError:
             continue
-        richest = Model(base, "free", "free")
-        for shape, through in MODELS:
-            model = Model(base, shape, through)
+        richest = Model(base, *RICHEST)
+        for kind in MODELS:
+            model = Model(base, *kind)
             contender = candidates.contender(model)
             if np.isnan(contender.squares).all():
                 continue
@@ -134,28 +120,50 @@ def tried(photographs: Detections, truth: Model, world: Candidates) -> list[Trie
                 richest=None if model == richest else candidates.scatter(richest),
             )
             camera = candidates.camera(model)[0]
-            off = rms_difference(camera, true, seen)
-            found.append(Tried(model, contender, camera, seen, error.seen_px, off))
+            found.append(Tried(model, contender, camera, seen, error.seen_px, of.off(camera, seen)))
     return found
 
 
-def base_first(rule: Callable) -> Callable:
-    """The base by its richest model, then a rule among its models."""
+class Rule(NamedTuple):
+    """The base by its richest model, then a rule among some kinds of model on it."""
 
-    def choose(entries: list[Tried], corners: np.ndarray) -> Tried:
-        rich = [entry for entry in entries if entry.model[1:3] == ("free", "free")]
+    among: Sequence[tuple[str, str]]
+    choose: Callable[[Sequence[Contender], np.ndarray], int]
+
+    def table(self, entries: list[Tried], corners: np.ndarray) -> tuple[list[Tried], Tried]:
+        """All that it tries, and what it takes."""
+        rich = [entry for entry in entries if entry.kind == RICHEST]
         base = rich[first_as_good([entry.contender for entry in rich], corners)].model.base
-        of_base = [entry for entry in entries if entry.model.base == base]
-        return of_base[rule([entry.contender for entry in of_base], corners)]
+        of_base = [entry for entry in entries if entry.model.base == base and entry.kind in self.among]
+        taken = of_base[self.choose([entry.contender for entry in of_base], corners)]
+        return [*(entry for entry in rich if entry not in of_base), *of_base], taken
 
-    return choose
+
+class OfAll(NamedTuple):
+    """One of all entries, whatever their base."""
+
+    choose: Callable[[list[Tried], np.ndarray], Tried]
+
+    def table(self, entries: list[Tried], corners: np.ndarray) -> tuple[list[Tried], Tried]:
+        """As of `Rule`."""
+        return entries, self.choose(entries, corners)
+
+
+def logarithms(entry: Tried, corners: np.ndarray) -> np.ndarray:
+    """Of each view's mean squared error."""
+    return np.log(entry.contender.squares / corners)
+
+
+def lowest(entries: list[Tried], corners: np.ndarray) -> Tried:
+    """The least held-out error."""
+    return min(entries, key=lambda entry: np.nan_to_num(logarithms(entry, corners).mean(), nan=np.inf))
 
 
 def in_the_middle(entries: list[Tried], corners: np.ndarray) -> Tried:
     """The camera nearest, in the mean square, to all that may be right: each counts exp(-z^2 / 2) where
     it loses z standard errors against the best.
     """
-    logs = np.array([np.log(entry.contender.squares / corners) for entry in entries])
+    logs = np.array([logarithms(entry, corners) for entry in entries])
     able = np.isfinite(logs).all(1) if np.isfinite(logs).all(1).any() else np.ones(len(logs), dtype=bool)
     lost = logs - logs[np.argmin(np.where(able, logs.mean(1), np.inf))]
     error = np.maximum(lost.std(1) / np.sqrt(len(corners) - 1), 1e-12)
@@ -165,79 +173,102 @@ def in_the_middle(entries: list[Tried], corners: np.ndarray) -> Tried:
 
 
 # What the default method does.
-OURS = "base first, then the richest unless worse"
-# Nobody can take it, since nobody knows it.
-MADE_BY = "the model that the photographs were made by"
-RULES: dict[str, Callable] = {
-    OURS: base_first(richest_unless_worse),
-    "base first, then the simplest as good": base_first(simplest_as_good),
-    "the lowest of all": lambda entries, corners: entries[
-        int(np.argmin([np.log(entry.contender.squares / corners).mean() for entry in entries]))
-    ],
-    "in the middle of all that may be right": in_the_middle,
-    "the lowest predicted error": lambda entries, corners: min(entries, key=lambda entry: entry.predicted),
+OURS = "base, then the richest or the simplest"
+RULES: dict[str, Rule | OfAll] = {
+    OURS: Rule((SIMPLEST, RICHEST), richest_unless_worse),
+    "base, its richest": Rule((RICHEST,), richest_unless_worse),
+    "base, then the richest of six unless worse": Rule(MODELS, richest_unless_worse),
+    "base, then the simplest of six as good": Rule(MODELS, simplest_as_good),
+    "the lowest of all": OfAll(lowest),
+    "in the middle of all that may be right": OfAll(in_the_middle),
+    "the lowest predicted error": OfAll(lambda entries, _: min(entries, key=lambda entry: entry.predicted)),
 }
 
 
-def in_words(ratios: list[float]) -> str:
+def in_words(ratios: Sequence[float]) -> str:
     """The geometric mean with its standard error, and what nine of ten are below."""
     logs = np.log(ratios)
     mean, error = np.exp(logs.mean()), np.exp(logs.mean()) * logs.std() / np.sqrt(max(len(logs) - 1, 1))
-    return f"{mean:.2f} ± {error:.2f}, nine of ten below {np.percentile(ratios, 90):.1f}"
+    return f"{mean:.2f} ± {error:.2f} {np.percentile(ratios, 90):5.1f}"
 
 
-def main(folder: Path, sets: int, only: str = "") -> None:
-    """Print a line for each set of photographs, and what each rule gives.
-
-    Args:
-        only: a case; the others are left out.
+class Found(NamedTuple):
+    """What a rule took from one set, px: its true error, the least of its table and of all, and the predicted
+    one.
     """
-    ratios: dict[str, list[float]] = {name: [] for name in (*RULES, MADE_BY)}
+
+    true: float
+    best_tried: float
+    best: float
+    predicted: float
+
+
+def line(name: str, found: Sequence[Found]) -> str:
+    """A rule's figures."""
+    own, of_all = [one.true / one.best_tried for one in found], [one.true / one.best for one in found]
+    error = np.exp(np.mean(np.log([one.true for one in found])))
+    return f"{name:45s} {in_words(own):>18s}   {in_words(of_all):>18s}   {error:.4f} px"
+
+
+def sets(folder: Path | None, count: int, only: str) -> Iterator[tuple[int, Set]]:
+    """Those that are asked for and have views enough; folder None: independent ones."""
+    for seed in range(count):
+        of = independent(seed) if folder is None else resimulated(folder, seed)
+        if len(of.photographs.views) >= FEWEST_VIEWS and only in ("", of.case):
+            yield seed, of
+
+
+def main(folder: Path | None, count: int, only: str) -> None:
+    """Print a line for each set of photographs, and what each rule gives."""
+    found: dict[str, list[Found]] = {name: [] for name in RULES}
+    made_by: list[float] = []
     by_entry: dict[tuple[str, ...], list[float]] = {}
-    honest: list[tuple[str, int, float]] = []
-    for seed in range(sets):
-        rng = np.random.default_rng(seed)
-        name = list(WORLDS)[rng.integers(len(WORLDS))]
-        case, photographs, truth, world = drawn(classic_corners(folder, name), WORLDS[name], rng)
-        wanted = len(photographs.views) >= 4 and only in ("", case)
-        entries = tried(photographs, truth, world) if wanted else []
+    about: list[tuple[str, int]] = []
+    for seed, of in sets(folder, count, only):
+        entries = [entry for entry in tried(of) if np.isfinite(entry.true)]
         if not entries:
             continue
-        corners = np.array([len(view.ids) for view in photographs.views], dtype=float)
+        views = of.photographs.views
+        corners = np.array([len(view.ids) for view in views], dtype=float)
         best = min(entry.true for entry in entries)
-        for rule, choose in RULES.items():
-            ratios[rule].append(choose(entries, corners).true / best)
-        found = {entry.model[:3]: entry.true / best for entry in entries}
-        ratios[MADE_BY].append(found[truth[:3]])
-        for entry, ratio in found.items():
-            by_entry.setdefault(entry, []).append(ratio)
-        taken = RULES[OURS](entries, corners)
-        honest.append((case, len(photographs.views), taken.predicted / taken.true))
-        told = f"{seed:3d} {name:12s} {case:8s} {len(photographs.views):2d} views"
-        print(f"{told}  {taken.model.base} {taken.true:.3f} px", flush=True)
-    for rule, found in ratios.items():
-        print(f"{rule:45s} {in_words(found)}")
-    always = min(
-        (entry for entry, found in by_entry.items() if len(found) == len(honest)),
-        key=lambda entry: np.mean(np.log(by_entry[entry])),
+        for name, rule in RULES.items():
+            table, taken = rule.table(entries, corners)
+            found[name].append(Found(taken.true, min(e.true for e in table), best, taken.predicted))
+        for entry in entries:
+            by_entry.setdefault(entry.model[:3], []).append(entry.true / best)
+            if of.model and entry.model[:3] == of.model[:3]:
+                made_by.append(entry.true / best)
+        about.append((of.case, len(views)))
+        print(f"{seed:3d} {of.case:12s} {len(views):2d} views  {found[OURS][-1].true:.3f} px", flush=True)
+    print(f"{'':45s} over the best tried   over the best of all; nine of ten are below")
+    for name in RULES:
+        print(line(name, found[name]))
+    if made_by:
+        print(f"{'the model that the photographs were made by':45s} {'':18s}   {in_words(made_by):>18s}")
+    often = {entry: ratios for entry, ratios in by_entry.items() if len(ratios) == len(about)}
+    for entry in sorted(often, key=lambda entry: np.mean(np.log(often[entry])))[:1]:
+        print(f"{'always ' + ', '.join(entry):45s} {'':18s}   {in_words(often[entry]):>18s}")
+    print(
+        "\nwhat the default takes; predicted over true, how often the true error is above twice the predicted"
     )
-    print(f"{'always ' + ', '.join(always):45s} {in_words(by_entry[always])}")
-    print(f"\nover {MADE_BY}")
-    for rule in RULES:
-        over = [ours / made for ours, made in zip(ratios[rule], ratios[MADE_BY], strict=True)]
-        print(f"{rule:45s} {in_words(over)}")
-    print("\npredicted over true, and how often the true error is above twice the predicted one")
-    groups = {case: [r for of, _, r in honest if of == case] for case in CASES}
+    ours = list(zip(about, found[OURS], strict=True))
+    groups = {case: [one for (of, _), one in ours if of == case] for case in sorted({of for of, _ in about})}
     groups |= {
-        f"{low} to {high} views": [r for _, m, r in honest if low <= m <= high]
-        for low, high in ((4, 6), (7, 10), (11, 30))
+        f"{low} to {high} views": [one for (_, m), one in ours if low <= m <= high] for low, high in VIEWS
     }
-    for name, found in (groups | {"all": [r for *_, r in honest]}).items():
-        if found:
-            mean, beyond = np.exp(np.mean(np.log(found))), np.mean(np.array(found) < 0.5)
-            print(f"{name:16s} {mean:.2f}, {beyond:.0%} of {len(found)}")
+    for name, some in (groups | {"all": found[OURS]}).items():
+        if some:
+            ratio = np.array([one.predicted / one.true for one in some])
+            honest = f"{np.exp(np.log(ratio).mean()):.2f}, {np.mean(ratio < 0.5):.0%} of {len(some)}"
+            print(f"{line(name, some)}   {honest}")
 
 
 if __name__ == "__main__":
-    asked = sys.argv[1:]
-    main(Path(os.environ["ORTHOSCOPE_DATASETS"]), int(asked[0]) if asked else 30, *asked[1:])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("count", type=int, nargs="?", default=30)
+    parser.add_argument("--only", default="", help="a case")
+    parser.add_argument("--independent", action="store_true")
+    asked = parser.parse_args()
+    main(None if asked.independent else Path(os.environ["ORTHOSCOPE_DATASETS"]), asked.count, asked.only)

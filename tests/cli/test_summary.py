@@ -1,7 +1,8 @@
-"""What the verbs print about corners that were left out."""
+"""What the verbs print about a calibration."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from orthoscope.cli.shared.summary import evaluation_lines
 from orthoscope.evaluation.evaluate import Evaluation, evaluate
+from orthoscope.fitting.calibration import Uncertainty
+from orthoscope.formats.own.json import text_of
 from orthoscope.methods.fccm import fccm
 from orthoscope.simulation.scene import paper_scene, simulate_detections
 from orthoscope.targets.detections import Outlier
@@ -59,3 +62,25 @@ def test_three_lines_say_what_matters_and_the_verdict_is_the_first(evaluation: E
 def test_who_wants_every_figure_gets_it(evaluation: Evaluation):
     words = {line.split()[0] for line in evaluation_lines(evaluation, verbose=True)}
     assert {"off", "rms", "held", "NCE", "misfit", "agreement", "lens"} <= words
+
+
+def test_json_has_the_deviations_that_the_lines_show(evaluation: Evaluation):
+    written = json.loads(text_of(evaluation))
+    assert written["deviations"] == pytest.approx(evaluation.calibration.uncertainty.deviations)
+
+
+def test_one_photograph_that_makes_the_held_out_error_is_named(evaluation: Evaluation):
+    first, *others = evaluation.views
+    views = (
+        replace(first, held_out_rms_px=20.0),
+        *(replace(view, held_out_rms_px=0.15) for view in others),
+    )
+    lines = evaluation_lines(replace(evaluation, views=views, held_out_rms_px=8.2))
+    assert f"8.2 px where a photograph was not used (0.15 px but for {first.image}" in lines[2]
+    assert "but for" not in evaluation_lines(evaluation)[2]
+
+
+def test_a_method_that_tells_no_deviations_says_so(evaluation: Evaluation):
+    silent = replace(evaluation.calibration, uncertainty=Uncertainty((), np.zeros((0, 0))))
+    assert "fccm does not tell" in evaluation_lines(replace(evaluation, calibration=silent))[1]
+    assert "does not tell" not in evaluation_lines(evaluation)[1]

@@ -102,9 +102,9 @@ def test_a_board_that_always_stands_upright_may_be_stretched_and_nobody_would_kn
 
     upright, turned = scatter(roll=(-0.02, 0.02)), scatter()
     fx, fy = (upright.names.index(name) for name in ("fx", "fy"))
-    aspect = np.zeros(len(upright.stretch))
+    aspect = np.zeros(upright.stretch.shape[1])
     aspect[[fx, fy]] = 1.0 / NARROW.intrinsics.fx, -1.0 / NARROW.intrinsics.fy
-    open_upright, open_turned = (np.sqrt(aspect @ s.stretch @ aspect) for s in (upright, turned))
+    open_upright, open_turned = (np.linalg.norm(s.stretch @ aspect) for s in (upright, turned))
     assert open_upright > 0.25 * STRETCH_SHARE  # views are tilted, and tell a part of it
     assert open_turned < 0.3 * open_upright
     assert (np.diag(upright.alike) >= np.diag(upright.model)).all()
@@ -155,8 +155,8 @@ def test_a_bent_board_taken_for_flat_is_off_by_more_than_it_knows_and_the_riches
 
 def test_errors_alike_within_views_are_seen(noisy: Detections):
     independent = linearised(fit_step_one(fit_flat(noisy, lens="brown"), shape="flat", first_lens="formula"))
-    tau = likenesses(independent, patterns_over_views(independent, noisy.target.points))
-    assert max(tau) < 1.6  # by chance: 20 to 32 patterns in each of twelve views
+    found = likenesses(independent, patterns_over_views(independent, noisy.target.points))
+    assert max(one.tau for one in found) < 1.6  # by chance: 20 to 32 patterns in each of twelve views
     rng, points = np.random.default_rng(0), noisy.target.points
     x = points[:, 0] - points[:, 0].mean()
     square = (x / np.abs(x).max()) ** 2
@@ -169,8 +169,7 @@ def test_errors_alike_within_views_are_seen(noisy: Detections):
             fit_flat(replace(noisy, views=tuple(views)), lens="brown"), shape="flat", first_lens="formula"
         )
     )
-    tau = likenesses(alike, patterns_over_views(alike, points))
-    assert tau[0] > 5.0
+    assert likenesses(alike, patterns_over_views(alike, points))[0].tau > 5.0
 
 
 def over_the_frame(columns: int, rows: int) -> np.ndarray:

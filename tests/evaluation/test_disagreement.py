@@ -10,9 +10,10 @@ from numpy.testing import assert_allclose
 
 from helpers.boards import NARROW, perfect
 from helpers.studied import Recipe, found_in, made, photographs_by, richest_fit
-from orthoscope.evaluation.disagreement import changes_of, disagreement, spread_of, wishes
+from orthoscope.evaluation.disagreement import Views, changes_of, disagreement, spread_of, wishes
 from orthoscope.evaluation.groups import two_groups
 from orthoscope.fitting.unseen.leave_one_out import leave_one_out
+from orthoscope.methods.fccm import fit_flat
 from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.scene import simulate_detections
 
@@ -64,7 +65,9 @@ def test_photographs_of_two_cameras_are_told_apart(kind: str, amount: float):
     world = made(replace(MANY, cameras=(kind, amount)), 0)
     detections = found_in(world)
     fit = richest_fit(detections)
-    groups = two_groups(fit, disagreement(fit, detections), leave_one_out(fit), detections, base="brown")
+    groups = two_groups(
+        fit, disagreement(fit, detections), leave_one_out(fit), fit_flat(detections, lens="brown")
+    )
     assert groups is not None
     first, second = ({world.groups[i] for i in group} for group in groups[:2])
     assert len(first) == len(second) == 1
@@ -83,7 +86,9 @@ def test_photographs_and_their_straightened_copies_are_told_apart_one_by_one(see
     both = [view for pair in zip(taken.views, copied, strict=True) for view in pair]
     detections = replace(taken, views=tuple(both))
     fit = richest_fit(detections)
-    groups = two_groups(fit, disagreement(fit, detections), leave_one_out(fit), detections, base="brown")
+    groups = two_groups(
+        fit, disagreement(fit, detections), leave_one_out(fit), fit_flat(detections, lens="brown")
+    )
     assert groups is not None
     assert {groups.first, groups.second} == {tuple(range(0, 16, 2)), tuple(range(1, 16, 2))}
 
@@ -93,7 +98,7 @@ def test_a_lens_that_focuses_anew_for_every_photograph_makes_no_two_groups():
     fit = richest_fit(detections)
     found = disagreement(fit, detections)
     assert found.certain
-    assert two_groups(fit, found, leave_one_out(fit), detections, base="brown") is None
+    assert two_groups(fit, found, leave_one_out(fit), fit_flat(detections, lens="brown")) is None
 
 
 def test_how_far_cameras_are_apart_is_found():
@@ -116,7 +121,8 @@ def test_wishes_are_the_changes_that_residuals_ask_for():
     change = np.array([0.3, -0.2, 0.5])
     residual = np.zeros_like(fit.residual)
     residual[4] = fit.changes(changes)[4] @ change
-    asked = wishes(replace(fit, residual=residual), detections.target.points, moves).kappa
+    views = Views.of(replace(fit, residual=residual), detections.target.points, moves)
+    asked = wishes(views, range(3)).kappa
     # the fit's own share in the view is granted, so that a wish is a little larger than what was put in
     assert (asked[4] / -change >= 1.0).all()
     assert (asked[4] / -change < 2.0).all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.bent_boards import bowed, drawn, photographed_with
 from helpers.scenes import NARROW
-from orthoscope.fitting.board_order import in_one_order, listed_as_known, turns_of
+from orthoscope.fitting import board_order
+from orthoscope.fitting.board_order import in_one_order, listed_as_known
+from orthoscope.fitting.board_turns import turns_of
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm, fit_flat
 from orthoscope.models.target_shape import TargetShape, without_similarity
@@ -69,7 +72,7 @@ def test_views_that_were_listed_from_another_end_are_found_and_turned_back(targe
 def test_what_turned_views_give_is_what_consistent_ones_give():
     target = ALIKE["half a turn"]
     right = photographed_with(shape_of(target), NARROW, 8, target=target, noise_px=0.1, seed=2)
-    settings = {"shape": "free", "first_lens": "formula", "base": "brown"}
+    settings: dict[str, Any] = {"shape": "free", "first_lens": "formula", "base": "brown"}
     found = decoupled(listed_from_elsewhere(right, {0: 1, 2: 1, 3: 1}), **settings)
     expected = decoupled(right, **settings)
     assert found.rms_px == pytest.approx(expected.rms_px, rel=1e-4)
@@ -97,3 +100,30 @@ def test_a_perfect_board_has_no_end_that_anyone_could_tell_and_is_left_as_it_is(
         photographed_with(0.0 * shape_of(target), NARROW, 8, target=target, noise_px=0.2, seed=seed)
     )
     assert in_one_order(flat) is flat
+
+
+@for_every_alike
+@pytest.mark.parametrize("views", [10, 16])
+def test_a_quick_look_never_hides_a_gain_that_is_sure(
+    target: Target, views: int, monkeypatch: pytest.MonkeyPatch
+):
+    for seed in range(3):
+        seen = photographed_with(
+            0.3 * shape_of(target), NARROW, views, target=target, noise_px=0.1, seed=seed
+        )
+        flat = fit_flat(listed_from_elsewhere(seen, {1: 1, 4: 1, 7: 1}), lens="brown")
+        looked = in_one_order(flat)
+        with monkeypatch.context() as without:
+            without.setattr(board_order, "QUICK_LOOK_VIEWS", 100)
+            asked = in_one_order(flat)
+        assert (looked is flat) == (asked is flat)
+        for one, other in zip(looked.detections.views, asked.detections.views, strict=True):
+            assert_array_equal(one.ids, other.ids)
+
+
+def test_many_views_of_which_few_are_turned_are_put_in_order():
+    target = ALIKE["half a turn"]
+    right = photographed_with(shape_of(target), NARROW, 70, target=target, noise_px=0.1, seed=5)
+    found = in_one_order(fit_flat(listed_from_elsewhere(right, {3: 1, 40: 1}), lens="brown"))
+    for view, as_it_was in zip(found.detections.views, right.views, strict=True):
+        assert_array_equal(view.ids, as_it_was.ids)

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from helpers.blocks import Blocks, Place
 from orthoscope.geometry.arrays import InputError
 from orthoscope.solve.least_squares import NormalEquations, Options, Status, shared_covariance, solve
-from orthoscope.solve.losses import Cauchy, Huber, Linear
+from orthoscope.solve.losses import Cauchy, Huber, Linear, Loss
 
 SHAPES = {  # k shared, m views, p of each view
     "like a calibration": (9, 5, 6),
@@ -282,3 +282,30 @@ def test_a_view_that_leaves_its_own_unknown_open_still_has_its_say():
     without = sums._replace(B=sums.B[:, :, :1], C=sums.C[:, :1, :1], c=sums.c[:, :1])
     many = 10**9  # so many measurements that the number of unknowns makes no difference
     assert_allclose(shared_covariance(sums, many), shared_covariance(without, many), rtol=1e-7)
+
+
+class Slow:
+    """Residuals x + 1 and bend x^2 + x - 1, least at x = 0: what is left after a step is `bend` of what was.
+
+    K. Madsen, H. Nielsen and O. Tingleff, Methods for non-linear least squares problems, 2004, example 3.4.
+    """
+
+    def __init__(self, bend: float) -> None:
+        self.bend = bend
+
+    def linearise(self, unknowns: np.ndarray, loss: Loss) -> NormalEquations:
+        x = unknowns[0]
+        e, J = np.array([x + 1.0, self.bend * x * x + x - 1.0]), np.array([1.0, 2.0 * self.bend * x + 1.0])
+        nothing = np.empty((0, 1, 0)), np.empty((0, 0, 0)), np.empty((0, 0))
+        return NormalEquations(float(e @ e), np.array([[J @ J]]), np.array([J @ e]), *nothing)
+
+    def move(self, unknowns: np.ndarray, shared: np.ndarray, views: np.ndarray) -> np.ndarray:
+        return unknowns + shared
+
+
+@pytest.mark.parametrize("bend", [0.8, -0.8], ids=["steps too short", "steps too long"])
+def test_where_every_step_errs_by_the_same_share_steps_are_made_as_long_as_is_best(bend):
+    found = solve(Slow(bend), np.array([0.1]), options=Options(tolerance=1e-14))
+    assert found.status is Status.CONVERGED
+    assert abs(found.unknowns[0]) < 1e-5
+    assert found.steps < 20  # as they are, it takes 53 and 32

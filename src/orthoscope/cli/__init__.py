@@ -23,6 +23,7 @@ from orthoscope.cli.simulate import simulate
 from orthoscope.cli.straighten import straighten
 from orthoscope.cli.target import target
 from orthoscope.cli.undistort import undistort
+from orthoscope.machine.memory import collect_seldom, keep_freed_memory
 from orthoscope.version import __version__
 
 __all__ = ["main", "verbs"]
@@ -64,5 +65,7 @@ for verb in (
 
 def main() -> None:
     """Run the command line, BLAS with one thread; errors become one message and an exit code."""
+    collect_seldom()
+    keep_freed_memory()
     with errors_as_exit_codes(), single_threaded(), stopped_by_sigterm():
         verbs(standalone_mode=False)

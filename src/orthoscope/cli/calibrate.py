@@ -21,7 +21,7 @@ Example:
   verdict    Good within a region: off by about 0.2 px where corners were seen, and by less than 0.5 px over
              67 % of the frame. Too few corners were seen at the top left. Next, photograph the target at the
              top left.
-  camera     fx 534.83 ± 0.78  fy 535.07 ± 0.85  cx 342.10 ± 0.99  cy 239.69 ± 0.88  lens free
+  camera     fx 534.83 ± 0.78  fy 535.07 ± 0.85  cx 342.10 ± 0.99  cy 239.69 ± 0.88  lens free on brown
   photos     14 used, 756 corners; corners missed by 0.084 px where a photograph was not used
   wrote      camera/detections.json, camera/calibration.json, camera/evaluation.json, camera/report.html
 

@@ -23,6 +23,7 @@ camera calibration, IJCV 2022, and mrcal's documentation predict the like from c
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -121,44 +122,115 @@ class _Given(NamedTuple):
     differ_px: float
 
 
+class _Settled(NamedTuple):
+    """How an image moves with a camera's d unknowns, a motion taken out: G - M U.
+
+    Attributes:
+        slopes: G, (n,2,d).
+        motion: M, (n,2,c).
+        undone: U, (c,d).
+    """
+
+    slopes: Float[ndarray, "n 2 d"]
+    motion: Float[ndarray, "n 2 c"]
+    undone: Float[ndarray, "c d"]
+
+    def times(self, rows: Float[ndarray, "r d"]) -> Float[ndarray, "n 2 r"]:
+        """The movements by changes of the unknowns."""
+        return self.slopes @ rows.T - self.motion @ (self.undone @ rows.T)
+
+    def spread(
+        self, covariance: Float[ndarray, "d d"], unsettled: Float[ndarray, " n"]
+    ) -> Float[ndarray, " n"]:
+        """The variance of the image, both coordinates together.
+
+        Args:
+            unsettled: the same of G alone.
+        """
+        by_motion = covariance @ self.undone.T
+        crossed = self.slopes @ by_motion - 0.5 * self.motion @ (self.undone @ by_motion)
+        return np.maximum(unsettled - 2.0 * (crossed * self.motion).sum((1, 2)), 0.0)
+
+
+class _Imaged:
+    """A camera's scatter, and the slopes of its image of places by its unknowns, (n,2,d)."""
+
+    def __init__(self, scatter: Scatter, rays: Float[ndarray, "n 3"]) -> None:
+        self.scatter, self.repeated = scatter, scatter.repeated
+        with np.errstate(invalid="ignore"):
+            self.slopes = image_slopes(scatter.camera, rays, scatter.names)
+
+    @cached_property
+    def spread(self) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Float[ndarray, " n"]]:
+        """The variance of the image by `repeated`, `alike` and `prior`, no motion taken out."""
+        variances = np.zeros((3, len(self.slopes)))
+        for along in self.slopes.transpose(1, 0, 2):
+            # A displacement along x moves no pixel along y.
+            moving = np.flatnonzero((np.abs(along) > 0.0).any(0))
+            some, block = along[:, moving], np.ix_(moving, moving)
+            for found, covariance in zip(
+                variances, (self.repeated, self.scatter.alike, self.scatter.prior), strict=True
+            ):
+                found += ((some @ covariance[block]) * some).sum(1)
+        return variances[0], variances[1], variances[2]
+
+    def settled(self, rays: Float[ndarray, "m 3"], fitted: int, distance: float) -> _Settled:
+        """The slopes at the first of the places, the motion taken out that undoes most over some of them.
+
+        Args:
+            rays: to these, of any lengths.
+            fitted: how many of them the motion is fitted to.
+        """
+        slopes = self.slopes[: len(rays)]
+        with np.errstate(invalid="ignore"):
+            motion = motion_slopes(self.scatter.camera, rays, distance)
+        undone = np.linalg.lstsq(
+            motion[:fitted].reshape(2 * fitted, -1), slopes[:fitted].reshape(2 * fitted, -1), rcond=None
+        )[0]
+        return _Settled(slopes, motion, undone)
+
+
 class _Variances:
     """E^2 and its parts at places along unit rays, a motion fitted out over the first of them."""
 
     def __init__(
         self,
-        scatter: Scatter,
-        rich: Scatter | None,
-        poorer: Scatter,
+        own: _Imaged,
+        richer: _Imaged | None,
+        poorer: _Imaged,
         rays: Float[ndarray, "n 3"],
         fitted: int,
         distance: float,
         given: _Given,
     ) -> None:
         # rays may have lengths of their own: places along them, in units of the distance
-        slopes = _settled(scatter, rays, fitted, distance)
+        settled, scatter = own.settled(rays, fitted, distance), own.scatter
+        repeated, alike, prior = (variances[: len(rays)] for variances in own.spread)
         self.fitted = fitted
-        self.model, self.alike = _spread(slopes[:fitted], scatter.repeated), _spread(slopes, scatter.alike)
-        self.alike *= given.copies
-        by_view = slopes @ scatter.left_out.T  # (n, 2, m)
+        self.model = settled.spread(own.repeated, repeated)[:fitted]
+        self.alike = given.copies * settled.spread(scatter.alike, alike)
+        by_view = settled.times(scatter.left_out)  # (n, 2, m)
         self.moved = (by_view**2).sum(1)  # (n, m)
-        self.views = np.nansum(self.moved, axis=1) + _spread(slopes, scatter.prior)
+        self.views = np.nansum(self.moved, axis=1) + settled.spread(scatter.prior, prior)
         draws = _effective_draws(np.nansum(self.moved[:fitted], axis=0))
         self.views = (draws * self.views + ALIKE_DRAWS * self.alike) / (draws + ALIKE_DRAWS)
         self.bias = np.zeros(len(rays))
-        if rich is not None:
-            of_rich = _settled(rich, rays, fitted, distance)
+        if richer is not None:
+            of_rich, rich = richer.settled(rays, fitted, distance), richer.scatter
             if not scatter.stretch.any():  # a target that is taken for flat hides a stretch as well
-                hidden = _spread(of_rich, rich.stretch)
+                hidden = (of_rich.times(rich.stretch) ** 2).sum((1, 2))
                 self.alike, self.views = self.alike + hidden, self.views + hidden
-            apart = difference_of_images(rich.camera, poorer.camera, rays, rays[:fitted], distance=distance)
-            if poorer is not scatter:
-                by_view = _settled(poorer, rays, fitted, distance) @ poorer.left_out.T
-            both = by_view - of_rich @ rich.left_out.T
+            apart = difference_of_images(
+                rich.camera, poorer.scatter.camera, rays, rays[:fitted], distance=distance
+            )
+            if poorer is not own:
+                by_view = poorer.settled(rays, fitted, distance).times(poorer.scatter.left_out)
+            both = by_view - of_rich.times(rich.left_out)
             by_chance = np.nansum(both**2, axis=(1, 2))
             self.apart, self.by_chance = np.nan_to_num((apart**2).sum(1)), by_chance
             self.bias = np.maximum(self.apart - by_chance, 0.0)
         self.off, self.differ = np.zeros(len(rays)), given.differ_px**2
-        if given.judged is not None:
+        if given.judged is not None and given.judged is not scatter.camera:
             off = difference_of_images(scatter.camera, given.judged, rays, rays[:fitted], distance=distance)
             self.off = np.nan_to_num((off**2).sum(1))
             if np.mean(self.off[:fitted]) < AS_GOOD_SHARE**2 * np.nanmean(self.total[:fitted]):
@@ -226,12 +298,14 @@ def predicted_error(
     typical = median(each)
     middle = np.array([median(along) for along in seen.T])
     ways, given = ways_from(middle, camera.image_size), _Given(copies, judged, differ_px)
-    places = np.concatenate([rays, camera.unproject(cells), camera.unproject(ways.reshape(-1, 2))])
+    places = np.concatenate([rays, camera.unproject(np.concatenate([cells, ways.reshape(-1, 2)]))])
     part_seen, part_frame = slice(len(seen)), slice(len(seen), len(seen) + len(cells))
-    far = _Variances(scatter, richest, poorer or scatter, places, len(seen), np.inf, given)
+    own, richer = _Imaged(scatter, places), richest and _Imaged(richest, places)
+    other = _Imaged(poorer, places) if poorer and poorer is not scatter else own
+    far = _Variances(own, richer, other, places, len(seen), np.inf, given)
     close = places[: part_frame.stop].copy()
     close[part_seen] *= each[:, None] / typical
-    near = _Variances(scatter, richest, poorer or scatter, close, len(seen), typical, given)
+    near = _Variances(own, richer, other, close, len(seen), typical, given)
     seen_px, model_px, alike_px, views_px, bias_px = far.parts
     along = np.sqrt(far.total[part_frame.stop :]).reshape(REGION_DIRECTIONS, REGION_STEPS)
     corners = seen if corners is None else corners
@@ -284,21 +358,6 @@ def picked(pixels: Float[ndarray, "n 2"]) -> Int[ndarray, " s"]:
     return order[evenly(len(order), PLACE_COUNT)]
 
 
-def _settled(
-    scatter: Scatter, rays: Float[ndarray, "n 3"], fitted: int, distance: float
-) -> Float[ndarray, "n 2 d"]:
-    """Slopes of the image by the camera's unknowns, the motion taken out that undoes most over the first
-    places.
-    """
-    with np.errstate(invalid="ignore"):
-        slopes = image_slopes(scatter.camera, rays, scatter.names)
-        motion = motion_slopes(scatter.camera, rays, distance)
-    undone = np.linalg.lstsq(
-        motion[:fitted].reshape(2 * fitted, -1), slopes[:fitted].reshape(2 * fitted, -1), rcond=None
-    )[0]
-    return slopes - motion @ undone
-
-
 def _effective_draws(squares: Float[ndarray, " m"]) -> float:
     """Of how many independent draws of one size a sum of squares is as sure (F. Satterthwaite, 1946).
 
@@ -306,11 +365,6 @@ def _effective_draws(squares: Float[ndarray, " m"]) -> float:
         squares: by each view left out; 0 where the others cannot tell.
     """
     return float(squares.sum() ** 2 / max((squares**2).sum(), 1e-300))
-
-
-def _spread(slopes: Float[ndarray, "n 2 d"], covariance: Float[ndarray, "d d"]) -> Float[ndarray, " n"]:
-    """The variance of the image, both coordinates together."""
-    return ((slopes @ covariance) * slopes).sum((1, 2))
 
 
 def _cells(width: int, height: int, parts: int = 1) -> Float[ndarray, "n 2"]:

@@ -45,8 +45,11 @@ def corners_by_cell(
 def cells_with_rays(camera: Camera, grid: tuple[int, int] = COVERAGE_GRID) -> Bool[ndarray, "rows columns"]:
     """Which cells have a ray at their middle or at one of their corners."""
     x, y = _edges(camera.image_size, grid)
-    at_corner = _has_ray(camera, x, y)
-    at_middle = _has_ray(camera, 0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]))
+    places = np.meshgrid(x, y), np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]))
+    pixels = [np.stack(place, axis=-1).reshape(-1, 2) for place in places]
+    has_ray = np.isfinite(camera.unproject(np.concatenate(pixels))[:, 2])
+    corners, middles = np.split(has_ray, [len(pixels[0])])
+    at_corner, at_middle = corners.reshape(len(y), len(x)), middles.reshape(len(y) - 1, len(x) - 1)
     return at_middle | at_corner[1:, 1:] | at_corner[1:, :-1] | at_corner[:-1, 1:] | at_corner[:-1, :-1]
 
 
@@ -73,8 +76,3 @@ def _edges(image_size: tuple[int, int], grid: tuple[int, int]) -> tuple[ndarray,
     return np.linspace(-0.5, image_size[0] - 0.5, grid[0] + 1), np.linspace(
         -0.5, image_size[1] - 0.5, grid[1] + 1
     )
-
-
-def _has_ray(camera: Camera, x: ndarray, y: ndarray) -> ndarray:
-    pixels = np.stack(np.meshgrid(x, y), axis=-1)
-    return np.isfinite(camera.unproject(pixels.reshape(-1, 2))[:, 2]).reshape(pixels.shape[:2])

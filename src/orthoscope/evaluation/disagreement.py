@@ -27,7 +27,7 @@ itself has no name, and is `mixed`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -35,7 +35,7 @@ import numpy as np
 
 from orthoscope.evaluation.misfit.f_distribution import f_survival
 from orthoscope.fitting.slopes.linearised import Linearised
-from orthoscope.fitting.unseen.leave_one_out import hat_of
+from orthoscope.fitting.unseen.leave_one_out import say_of
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.difference import image_difference
@@ -45,6 +45,7 @@ from orthoscope.targets.detections import Detections
 __all__ = [
     "AGREED",
     "Disagreement",
+    "Views",
     "Wishes",
     "changes_of",
     "disagreement",
@@ -149,18 +150,17 @@ def disagreement(fit: Linearised, detections: Detections) -> Disagreement:
     shears = fit.without_pose(fit.root[..., None] * _shears(detections))
     of_lens = changes_of(fit, ("k1",))[1][:, len(names) :]
     moves = np.concatenate([fit.moves(changes), shears, fit.moves(of_lens)], axis=2)
-    of_K = wishes(fit, points, moves[:, :, : len(names)])
+    views = Views.of(fit, points, moves)
+    of_K = wishes(views, range(len(names)))
     by_kind = {
-        kind: wishes(fit, points, moves[:, :, columns])
-        for kind, columns in KINDS.items()
-        if columns[-1] < moves.shape[2]
+        kind: wishes(views, columns) for kind, columns in KINDS.items() if columns[-1] < moves.shape[2]
     }
     tests = [of_K, *(by_kind[kind] for kind in TESTED_KINDS)]
     strongest = min(tests, key=lambda test: (not test.certain, test.p_value))
     if not strongest.certain:
         return replace(AGREED, f2=of_K.f2, p_value=of_K.p_value, wishes=of_K)
     kind = _kind(by_kind)
-    of_camera = wishes(fit, points, moves[:, :, [0, 1, 2, 5]]) if kind == "lens" else of_K
+    of_camera = wishes(views, [0, 1, 2, 5]) if kind == "lens" else of_K
     found = Disagreement(strongest.f2, strongest.p_value, True, kind, 0.0, 0.0, 0.0, of_camera)
     sure = any(test.certain for test in (of_K, by_kind["zoom"], by_kind["centre"]))
     if kind == "shutter" or (kind == "mixed" and not sure):
@@ -208,28 +208,47 @@ def changes_of(fit: Linearised, more: tuple[str, ...] = ()) -> tuple[tuple[str, 
     return tuple(steps), changes
 
 
-def wishes(fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]) -> Wishes:
-    """What the views wish, and whether the wishes differ.
+class Views(NamedTuple):
+    """What is asked of the views of a fit.
 
-    Args:
-        points: the target's corners, metres.
-        moves: C_j, of weighted residuals with the pose of each view fitted.
+    Attributes:
+        moves: (m,n,c) C_j of all changes, weighted residuals with the pose of each view fitted.
+        patterns: (m,n,6) second-order patterns of the board, of length 1, as these.
+        told: (m,c+6,c+6) R_j'(I - B_j) R_j of both, R_j, side by side.
+        errors: (m,n) e_j.
+        noise: px^2 of a coordinate.
     """
-    told = _told(moves, hat_of(fit, moves))
-    score = (moves * fit.errors[..., None]).sum(1)
+
+    moves: Float[ndarray, "m n c"]
+    patterns: Float[ndarray, "m n p"]
+    told: Float[ndarray, "m d d"]
+    errors: Float[ndarray, "m n"]
+    noise: float
+
+    @classmethod
+    def of(cls, fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]) -> Views:
+        """points: the target's corners, metres."""
+        x, y = (points[:, :2] - points[:, :2].mean(0)).T / max(float(np.ptp(points[:, :2])), 1e-300)
+        shapes, zero = np.stack([x * x, x * y, y * y], axis=1), np.zeros((len(points), 3))
+        patterns = fit.without_pose(fit.root[..., None] * np.block([[shapes, zero], [zero, shapes]]))
+        patterns = patterns / _lengths(patterns)
+        both = np.concatenate([moves, patterns], axis=2)
+        told = both.transpose(0, 2, 1) @ both - say_of(fit, both)[0]
+        return cls(moves, patterns, 0.5 * (told + told.transpose(0, 2, 1)), fit.errors, fit.noise)
+
+
+def wishes(views: Views, changes: Sequence[int]) -> Wishes:
+    """What the views wish of some of the changes, and whether the wishes differ."""
+    some = list(changes)
+    moves, told = views.moves[:, :, some], views.told[:, some][:, :, some]
+    score = (moves * views.errors[..., None]).sum(1)
     inverse, rank = _pseudo_inverse(told)
     kappa = -(inverse @ score[..., None])[..., 0]
-    f = float((score * -kappa).sum() / (fit.noise * max(rank.sum(), 1)))
-    tau, freedom = _alike(fit, points, moves)
-    f2, tested = f / max(1.0, tau), float(rank.sum() - moves.shape[2])
+    f = float((score * -kappa).sum() / (views.noise * max(rank.sum(), 1)))
+    tau, freedom = _alike(views, some)
+    f2, tested = f / max(1.0, tau), float(rank.sum() - len(some))
     p_value = f_survival(f2, tested, freedom) if tested > 0 and freedom > 0 else float("nan")
-    return Wishes(kappa, told / (fit.noise * max(1.0, tau)), f2, p_value, tau)
-
-
-def _told(moves: Float[ndarray, "m n c"], explained: Float[ndarray, "m n c"]) -> Float[ndarray, "m c c"]:
-    """T_j = C_j'(I - B_j) C_j."""
-    told = moves.transpose(0, 2, 1) @ (moves - explained)
-    return 0.5 * (told + told.transpose(0, 2, 1))
+    return Wishes(kappa, told / (views.noise * max(1.0, tau)), f2, p_value, tau)
 
 
 def _pseudo_inverse(told: Float[ndarray, "m c c"]) -> tuple[Float[ndarray, "m c c"], Float[ndarray, " m"]]:
@@ -243,22 +262,27 @@ def _pseudo_inverse(told: Float[ndarray, "m c c"]) -> tuple[Float[ndarray, "m c 
     return inverse * scale * scale[:, None], strong.sum(1).astype(float)
 
 
-def _alike(
-    fit: Linearised, points: Float[ndarray, "p 3"], moves: Float[ndarray, "m n c"]
-) -> tuple[float, float]:
-    """tau of the second-order patterns that the changes do not make, and their degrees of freedom."""
-    x, y = (points[:, :2] - points[:, :2].mean(0)).T / max(float(np.ptp(points[:, :2])), 1e-300)
-    shapes, zero = np.stack([x * x, x * y, y * y], axis=1), np.zeros((len(points), 3))
-    patterns = np.block([[shapes, zero], [zero, shapes]])  # (2p, 6)
-    rows = fit.without_pose(fit.root[..., None] * patterns)
-    rows = rows / np.maximum(np.sqrt((rows**2).sum(1, keepdims=True)), 1e-300)
-    basis = np.linalg.qr(moves / np.maximum(np.sqrt((moves**2).sum(1, keepdims=True)), 1e-300))[0]
-    rows = rows - basis @ (basis.transpose(0, 2, 1) @ rows)
-    vectors, values, _ = np.linalg.svd(rows, full_matrices=False)
-    vectors = vectors * (values > LEAST_OWN_SINGULAR_VALUE)[:, None]
-    freedom = float((vectors * (vectors - hat_of(fit, vectors))).sum())
-    energy = float(((vectors.transpose(0, 2, 1) @ fit.errors[..., None]) ** 2).sum())
-    return energy / (fit.noise * max(freedom, 1e-9)), freedom
+def _alike(views: Views, some: list[int]) -> tuple[float, float]:
+    """tau of the second-order patterns that these changes do not make, and their degrees of freedom."""
+    moves, patterns = views.moves[:, :, some], views.patterns
+    lengths = _lengths(moves)
+    basis, triangle = np.linalg.qr(moves / lengths)
+    shared = basis.transpose(0, 2, 1) @ patterns
+    vectors, values, turned = np.linalg.svd(patterns - basis @ shared, full_matrices=False)
+    own = values > LEAST_OWN_SINGULAR_VALUE
+    # the vectors as sums of moves and patterns
+    by_pattern = turned.transpose(0, 2, 1) * np.where(own, 1.0 / np.where(own, values, 1.0), 0.0)[:, None]
+    by_move = -np.linalg.pinv(triangle) @ shared @ by_pattern / lengths.transpose(0, 2, 1)
+    sums = np.concatenate([by_move, by_pattern], axis=1)
+    columns = [*some, *range(views.moves.shape[2], views.told.shape[1])]
+    told = views.told[:, columns][:, :, columns]
+    freedom = float((sums * (told @ sums)).sum())
+    energy = float((((vectors * own[:, None]).transpose(0, 2, 1) @ views.errors[..., None]) ** 2).sum())
+    return energy / (views.noise * max(freedom, 1e-9)), freedom
+
+
+def _lengths(columns: Float[ndarray, "m n c"]) -> Float[ndarray, "m 1 c"]:
+    return np.maximum(np.sqrt((columns**2).sum(1, keepdims=True)), 1e-300)
 
 
 def spread_of(score: Float[ndarray, "m c"], told: Float[ndarray, "m c c"]) -> Float[ndarray, "c c"]:

@@ -21,6 +21,7 @@ quadratics).
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -29,14 +30,12 @@ from orthoscope.evaluation.disagreement import Disagreement, changes_of, disagre
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.slopes.linearised import Linearised
-from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, hat_of, leave_one_out
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, leave_one_out, say_of
 from orthoscope.geometry.arrays import Bool, CalibrationError, Float, ndarray
-from orthoscope.methods.decoupled.fitters import COMPARED_TOLERANCE
+from orthoscope.methods.decoupled.fitters import COMPARED
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
-from orthoscope.methods.fccm import fit_flat
 from orthoscope.models.lenses.table import FREE
-from orthoscope.targets.detections import Detections
 
 __all__ = ["Groups", "two_groups"]
 
@@ -78,26 +77,64 @@ class Groups(NamedTuple):
     unsure: tuple[int, ...] = ()
 
 
+class _Cameras:
+    """Cameras of groups of the views, every corner free and a free lens, each fitted once.
+
+    Args:
+        together: one camera for all, with a flat target: what each group's fit starts from.
+    """
+
+    def __init__(self, together: Calibration) -> None:
+        self._together = together
+        self._fitted, self.squares = cache(self._fit), cache(self._squares)
+
+    def agree(self, group: tuple[int, ...]) -> bool:
+        """Whether the views of a group agree on one camera: halves of a zoom in many steps, or of photographs
+        by a rolling shutter, are better than the whole, but are no cameras.
+        """
+        known = linearised(self._fitted(group))
+        return not disagreement(known, self._together.detections.only(group)).certain
+
+    def _fit(self, group: tuple[int, ...]) -> StepOneFit:
+        start = replace(
+            self._together,
+            detections=self._together.detections.only(group),
+            camera_from_target=tuple(self._together.camera_from_target[i] for i in group),
+        )
+        return fit_step_one(start, shape="free", first_lens=FREE, ending=COMPARED)
+
+    def _squares(self, group: tuple[int, ...]) -> Float[ndarray, " m"]:
+        """Squared error of each view by a group's camera: left out where it is of the group."""
+        detections, fit = self._together.detections, self._fitted(group)
+        shape, camera = fit.shape, fit.estimate.camera
+        poses = resect(camera, detections, shape=shape, near=self._together.camera_from_target)
+        squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
+        squares[list(group)] = leave_one_out(linearised(fit)).squares
+        return squares
+
+
 class _Quadratics(NamedTuple):
     """What the views say of a change k: 2 k's_j + k'T_j k, over the noise.  score (m,c), told (m,c,c)."""
 
     score: ndarray
     told: ndarray
 
-    def at(self, change: Float[ndarray, " c"]) -> Float[ndarray, " m"]:
-        """Of each view."""
-        return 2.0 * self.score @ change + (self.told @ change) @ change
+    def at(self, change: Float[ndarray, "*s c"]) -> Float[ndarray, "*s m"]:
+        """Of each view, for each of the changes."""
+        squares = (change[..., :, None] * change[..., None, :]).reshape(*change.shape[:-1], -1)
+        return 2.0 * change @ self.score.T + squares @ self.told.reshape(len(self.told), -1).T
 
-    def lowest(self, say: Float[ndarray, " m"]) -> Float[ndarray, " c"]:
+    def lowest(self, say: Float[ndarray, "*s m"]) -> Float[ndarray, "*s c"]:
         """The change at which the sum over views, each with its say, is lowest."""
-        told = (say[:, None, None] * self.told).sum(0)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(told), 1e-300))
-        faint = 1e-9 * np.eye(len(told))
-        return -scale * np.linalg.solve(told * scale * scale[:, None] + faint, scale * (say @ self.score))
+        c = self.score.shape[1]
+        told = (say @ self.told.reshape(len(self.told), -1)).reshape(*say.shape[:-1], c, c)
+        scale = 1.0 / np.sqrt(np.maximum(np.diagonal(told, axis1=-2, axis2=-1), 1e-300))
+        system = told * scale[..., None] * scale[..., None, :] + 1e-9 * np.eye(c)
+        return -scale * np.linalg.solve(system, (scale * (say @ self.score))[..., None])[..., 0]
 
 
 def two_groups(
-    fit: Linearised, found: Disagreement, whole: LeaveOneOut, detections: Detections, *, base: str
+    fit: Linearised, found: Disagreement, whole: LeaveOneOut, together: Calibration
 ) -> Groups | None:
     """The two groups that photographs which do not agree fall into; None where they fall into no two.
 
@@ -105,8 +142,7 @@ def two_groups(
         fit: of all views, every corner free and a free lens.
         found: how they disagree.
         whole: each view left out of the fit; one by one, since copies may be of two cameras.
-        detections: of the fit.
-        base: the formula under the free lens.
+        together: the same views by one camera and a flat target, its lens the formula under the free one.
     """
     if found.wishes is None or fit.views < 2 * FEWEST_GROUP_VIEWS:
         return None
@@ -115,10 +151,10 @@ def two_groups(
     explained = -noise * groupings[0][0] / float((fit.errors**2).sum()) if groupings else 0.0
     joint = float(np.nansum(whole.squares))
     starts = [each for _, each in groupings[:REFINED_GROUPINGS]] if explained > LEAST_EXPLAINED_SHARE else []
-    together = fit_flat(detections, lens=base) if starts else None
-    squares, second = _best_refined(together, starts, joint) if together else (np.inf, None)
-    if together and second is not None and np.sqrt(squares / joint) < APART_SHARE:
-        if not _agree_by_themselves(together, second):
+    cameras = _Cameras(together)
+    squares, second = _best_refined(cameras, starts, joint)
+    if second is not None and np.sqrt(squares / joint) < APART_SHARE:
+        if not all(cameras.agree(group) for group in _parts(second)):
             return None
         return _named(second, np.ones(len(second), dtype=bool))
     return None if found.kind == "shutter" else _two_values(_quadratics(fit, noise))
@@ -127,7 +163,7 @@ def two_groups(
 def _quadratics(fit: Linearised, noise: float, more: tuple[str, ...] = ()) -> _Quadratics:
     _, changes = changes_of(fit, more)
     moves = fit.moves(changes)
-    told = moves.transpose(0, 2, 1) @ (moves - hat_of(fit, moves))
+    told = moves.transpose(0, 2, 1) @ moves - say_of(fit, moves)[0]
     return _Quadratics(
         (moves * fit.errors[..., None]).sum(1) / noise, 0.5 * (told + told.transpose(0, 2, 1)) / noise
     )
@@ -140,39 +176,39 @@ def _groupings(say: _Quadratics) -> list[tuple[float, Bool[ndarray, " m"]]]:
     views = len(say.score)
     faint = 1e-9 * np.eye(say.score.shape[1]) * np.trace(say.told.mean(0))
     wishes = -np.linalg.solve(say.told + faint, say.score[..., None])[..., 0]
-    cuts = [
-        [wish > cut for cut in np.sort(wish)[FEWEST_GROUP_VIEWS - 1 : -FEWEST_GROUP_VIEWS]]
-        for wish in wishes.T
-    ]
-    rng = np.random.default_rng(0)
-    starts = [rng.random(views) < 0.5 for _ in range(RANDOM_STARTS)] + [
-        start for of_wish in cuts for start in of_wish
-    ]
-    ends = [_clustered(say, start) for start in starts]
-    ends += [min(of_wish, key=lambda second: _value(say, second)) for of_wish in cuts if of_wish]
-    able = {
-        (second ^ second[0]).tobytes(): second
-        for second in ends
-        if FEWEST_GROUP_VIEWS <= second.sum() <= views - FEWEST_GROUP_VIEWS
-    }
-    return sorted(((_value(say, second), second) for second in able.values()), key=lambda entry: entry[0])
+    cuts = [wish > np.sort(wish)[FEWEST_GROUP_VIEWS - 1 : -FEWEST_GROUP_VIEWS, None] for wish in wishes.T]
+    random = np.random.default_rng(0).random((RANDOM_STARTS, views)) < 0.5
+    best_cuts = [of_wish[_values(say, of_wish).argmin()] for of_wish in cuts]
+    ends = np.concatenate([_clustered(say, np.concatenate([random, *cuts])), best_cuts])
+    count = ends.sum(1)
+    able = ends[(count >= FEWEST_GROUP_VIEWS) & (count <= views - FEWEST_GROUP_VIEWS)]
+    distinct = list({(second ^ second[0]).tobytes(): second for second in able}.values())
+    values = _values(say, np.array(distinct, dtype=bool).reshape(-1, views)).tolist()
+    return sorted(zip(values, distinct, strict=True), key=lambda entry: entry[0])
 
 
-def _clustered(say: _Quadratics, second: Bool[ndarray, " m"]) -> Bool[ndarray, " m"]:
-    """k-means on quadratics from a start."""
+def _clustered(say: _Quadratics, second: Bool[ndarray, "s m"]) -> Bool[ndarray, "s m"]:
+    """k-means on quadratics from each of the starts."""
+    second, moving = second.copy(), np.arange(len(second))
     for _ in range(SETTLING_ROUNDS):
-        if not 1 <= second.sum() < len(second):
+        count = second[moving].sum(1)
+        moving = moving[(count >= 1) & (count < second.shape[1])]
+        tried = second[moving]
+        moved = say.at(say.lowest(tried.astype(float))) < say.at(say.lowest((~tried).astype(float)))
+        second[moving] = moved
+        moving = moving[(moved != tried).any(1)]
+        if not len(moving):
             break
-        moved = say.at(say.lowest(second.astype(float))) < say.at(say.lowest((~second).astype(float)))
-        if (moved == second).all():
-            break
-        second = moved
     return second
 
 
-def _value(say: _Quadratics, second: Bool[ndarray, " m"]) -> float:
-    """The sum of the quadratics, each at its group's lowest."""
-    return float(sum(say.at(say.lowest(group.astype(float)))[group].sum() for group in (~second, second)))
+def _values(say: _Quadratics, second: Bool[ndarray, "s m"]) -> Float[ndarray, " s"]:
+    """Of each grouping the sum of the quadratics, each at its group's lowest."""
+    first, other = (
+        (say.at(say.lowest(group)) * group).sum(1)
+        for group in (second.astype(float), (~second).astype(float))
+    )
+    return first + other
 
 
 def _two_values(say: _Quadratics) -> Groups | None:
@@ -184,9 +220,7 @@ def _two_values(say: _Quadratics) -> Groups | None:
     likely = np.zeros(share.shape[1])
     for _ in range(SETTLING_ROUNDS):
         weight = np.maximum(share.mean(1), 1e-6)
-        each = np.stack(
-            [np.log(w) - 0.5 * say.at(say.lowest(part)) for w, part in zip(weight, share, strict=True)]
-        )
+        each = np.log(weight)[:, None] - 0.5 * say.at(say.lowest(share))
         likely = np.logaddexp(*each)
         share = np.exp(each - likely)
     if likely.sum() - _likelihood_of_spread(say) < LEAST_LOG_RATIO:
@@ -207,7 +241,7 @@ def _likelihood_of_spread(say: _Quadratics) -> float:
 
 
 def _best_refined(
-    together: Calibration, starts: list[Bool[ndarray, " m"]], joint: float
+    cameras: _Cameras, starts: list[Bool[ndarray, " m"]], joint: float
 ) -> tuple[float, Bool[ndarray, " m"] | None]:
     """The refined grouping with the least squares; no more starts where two have come to it, or some are
     without hope.
@@ -218,7 +252,7 @@ def _best_refined(
     best: tuple[float, ndarray | None] = (np.inf, None)
     hopeless = 0
     for start in starts:
-        refined = _refined(together, start, joint)
+        refined = _refined(cameras, start, joint)
         if refined is None:
             continue
         hopeless += refined[0] > HOPELESS_SHARE**2 * joint
@@ -231,66 +265,41 @@ def _best_refined(
     return best
 
 
-def _agree_by_themselves(together: Calibration, second: Bool[ndarray, " m"]) -> bool:
-    """Whether each group agrees on one camera: halves of a zoom in many steps, or of photographs by a rolling
-    shutter, are better than the whole, but are no cameras.
-    """
-    for group in (np.flatnonzero(~second), np.flatnonzero(second)):
-        known = linearised(_fit(together, group))
-        if disagreement(known, together.detections.only(group)).certain:
-            return False
-    return True
+def _parts(second: Bool[ndarray, " m"]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """The indices of the first group's views and of the second's."""
+    return tuple(np.flatnonzero(~second).tolist()), tuple(np.flatnonzero(second).tolist())
 
 
 def _refined(
-    together: Calibration, second: Bool[ndarray, " m"], joint: float
+    cameras: _Cameras, second: Bool[ndarray, " m"], joint: float
 ) -> tuple[float, Bool[ndarray, " m"]] | None:
     """Question 2: the squares of two cameras, and who is in the second group; None where a group gives no
     camera.
 
     Args:
-        together: one camera for all, with a flat target: what each group's fit starts from.
-        joint: the squares of one camera for all; where two leave too much of them, views stay where they are.
+        joint: the squares of one camera for all; where two leave too much of them, or one alone does, views
+            stay where they are.
     """
     seen: set[bytes] = set()
     best: tuple[float, ndarray] | None = None
     for _ in range(REFINING_ROUNDS):
-        if (
-            second.tobytes() in seen
-            or not FEWEST_GROUP_VIEWS <= second.sum() <= len(second) - FEWEST_GROUP_VIEWS
-        ):
+        parts, total = _parts(second), 0.0
+        if second.tobytes() in seen or min(map(len, parts)) < FEWEST_GROUP_VIEWS:
             break
         seen.add(second.tobytes())
         try:
-            squares = np.stack([_squares(together, np.flatnonzero(group)) for group in (~second, second)])
+            for part in sorted(parts, key=len):
+                total += float(cameras.squares(part)[list(part)].sum())
+                if not total <= HOPELESS_SHARE**2 * joint:
+                    break
         except CalibrationError:
             break
-        total = float(np.where(second, squares[1], squares[0]).sum())
         if np.isfinite(total) and (best is None or total < best[0]):
             best = total, second
         if not total <= HOPELESS_SHARE**2 * joint:
             break
-        second = squares[1] < squares[0]
+        second = cameras.squares(parts[1]) < cameras.squares(parts[0])
     return best
-
-
-def _squares(together: Calibration, group: ndarray) -> Float[ndarray, " m"]:
-    """Squared error of each view by a group's camera: left out where it is of the group."""
-    detections, fit = together.detections, _fit(together, group)
-    shape, camera = fit.shape, fit.estimate.camera
-    poses = resect(camera, detections, shape=shape, near=together.camera_from_target)
-    squares = np.array([(e**2).sum() for e in residuals_of(camera, poses, detections, shape=shape)])
-    squares[group] = leave_one_out(linearised(fit)).squares
-    return squares
-
-
-def _fit(together: Calibration, group: ndarray) -> StepOneFit:
-    start = replace(
-        together,
-        detections=together.detections.only(group),
-        camera_from_target=tuple(together.camera_from_target[i] for i in group),
-    )
-    return fit_step_one(start, shape="free", first_lens=FREE, tolerance=COMPARED_TOLERANCE)
 
 
 def _named(second: Bool[ndarray, " m"], sure: Bool[ndarray, " m"]) -> Groups:

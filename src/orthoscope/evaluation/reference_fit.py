@@ -78,7 +78,7 @@ def reference_fit(calibration: Calibration, fits: Fits) -> ReferenceFit | None:
         scatter,
         seen,
         distance=distance,
-        richest=richest.scatter if own else None,
+        richest=richest.scatter if richest.scatter is not scatter else None,
         poorer=richest.poorer,
         judged=calibration.camera,
         corners=pixels,
@@ -105,15 +105,19 @@ def _agreement(richest: RichestFit, calibration: Calibration) -> tuple[Disagreem
     """Whether the photographs agree on one camera, and if not, which of them belong together; where some of
     them do not agree, all are asked.
     """
-    known, detections = richest.known, calibration.detections
-    found = disagreement(known, richest.detections)
-    if found.certain and richest.detections is not detections and (all_ := richest_of_all(calibration)):
-        known = all_.known
-        found = disagreement(known, detections)
+    found = disagreement(richest.known, richest.detections)
+    if (
+        found.certain
+        and richest.detections is not calibration.detections
+        and (of_all := richest_of_all(calibration))
+    ):
+        richest = of_all
+        found = disagreement(richest.known, richest.detections)
     if not found.certain:
         return found, None
-    groups = two_groups(known, found, leave_one_out(known), detections, base=richest.base)
-    return (with_spread(found, known, detections) if groups else found), groups
+    known = richest.known
+    groups = two_groups(known, found, leave_one_out(known), richest.flat)
+    return (with_spread(found, known, richest.detections) if groups else found), groups
 
 
 def _distances(calibration: Calibration) -> Float[ndarray, " n"]:

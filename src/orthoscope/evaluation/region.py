@@ -18,6 +18,8 @@ __all__ = ["MARGIN_SHARE", "REGION_DIRECTIONS", "REGION_STEPS", "between", "grow
 REGION_DIRECTIONS = 48
 # The region is grown in so many steps.
 REGION_STEPS = 20
+# So many corners are looked at together, to keep what is between in a core's cache.
+CORNERS_AT_ONCE = 4096
 # Places count as between corners up to this share of the frame's longer side beyond them.
 MARGIN_SHARE = 1 / 16
 
@@ -88,7 +90,10 @@ def inside(polygon: Float[ndarray, "n 2"], pixels: Float[ndarray, "m 2"]) -> Boo
 
 def _ends(seen: Float[ndarray, "s 2"], margin: float) -> Float[ndarray, " directions"]:
     """How far out corners lie in every direction, and a margin."""
-    return (seen @ _directions().T).max(0) + margin
+    directions, ends = _directions().T, np.full(REGION_DIRECTIONS, -np.inf)
+    for start in range(0, len(seen), CORNERS_AT_ONCE):
+        ends = np.maximum(ends, (seen[start : start + CORNERS_AT_ONCE] @ directions).max(0))
+    return ends + margin
 
 
 def _directions() -> Float[ndarray, "directions 2"]:

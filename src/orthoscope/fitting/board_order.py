@@ -10,7 +10,8 @@ a camera and one smooth shape x of the board; T_g shows the shape as the view's 
 in turn is taken for the one that is right: the shape that it alone tells gives every other view its best
 turn, the shape is found anew from all, and so on until nothing changes (of many views, those that tell most
 are enough).  The best end is taken where it is surely better than the lists as they came.  A board without a
-shape of its own gains by no turn: nothing is changed, and nothing lost.
+shape of its own gains by no turn: nothing is changed, and nothing lost.  Of more than a few views a quick
+look (turn_gain.py) says first whether any turns can gain so much.
 """
 
 from __future__ import annotations
@@ -19,18 +20,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from orthoscope.fitting.board_turns import Turn, least_turned, shown_by, turns_after, turns_of
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.slopes.residual_slopes import residual_slopes
+from orthoscope.fitting.turn_gain import likely_turns
 from orthoscope.geometry.arrays import CalibrationError, Float, Int, ndarray
-from orthoscope.geometry.pose import Pose, nearest_rotation
+from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import TargetShape, polynomials
 from orthoscope.targets.detections import Detections, View
-from orthoscope.targets.target import Target
 
-__all__ = ["Turn", "in_one_order", "listed_as_known", "turns_of"]
+__all__ = ["in_one_order", "listed_as_known"]
 
 # At least so many views are needed: of two, either may be the one that is turned.
 FEWEST_ORDERED_VIEWS = 3
@@ -38,6 +40,10 @@ FEWEST_ORDERED_VIEWS = 3
 LIKELY_SHARE = 1e-3
 # Chance gives no gain of this many times the noise's variance for each view that is turned.
 SURE_GAIN = 10.0
+# From so many views on a quick look says whether to ask them all.
+QUICK_LOOK_VIEWS = 10
+# A quick look finds more than this share of the gain that is there.
+QUICK_LOOK_SHARE = 0.6
 # The turns are searched for in so many views, of those that tell most; all others follow from these.
 SEARCHED_VIEWS = 60
 # So many views, of those that tell most, are taken for the right one in turn.
@@ -46,44 +52,6 @@ START_VIEWS = 24
 VIEWS_AT_ONCE = 32
 # The turns are improved in at most so many rounds.
 ROUND_LIMIT = 20
-# Points nearer than this share of the target's size are one.
-SAME_SHARE = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class Turn:
-    """One way in which a target is its own image.
-
-    Attributes:
-        rotation: (3,3) about the middle of its points.
-        corners: (p,) which corner each one comes to lie on.
-    """
-
-    rotation: Float[ndarray, "3 3"]
-    corners: Int[ndarray, " p"]
-
-
-def turns_of(target: Target) -> list[Turn]:
-    """The turns that a detector may not tell from none, the turn by nothing first.
-
-    What a board says of itself, and the quarters of a square one: their colours change places where its
-    counts are odd, but not every detector looks at colours.
-    """
-    points = target.points - target.points.mean(0)
-    known = [np.arange(len(points)), *(target.board.symmetries() if target.board else ())]
-    if target.grid and target.grid[0] == target.grid[1]:
-        ids = np.arange(len(points)).reshape(target.grid)
-        known += [np.rot90(ids, quarters).ravel() for quarters in (1, 2, 3)]
-    distinct = {corners.tobytes(): corners for corners in known}
-    found = [Turn(nearest_rotation(points[corners].T @ points), corners) for corners in distinct.values()]
-    return [turn for turn in found if _fits(turn, points)]
-
-
-def _fits(turn: Turn, points: Float[ndarray, "p 3"]) -> bool:
-    """Whether the turn brings every point to where another is."""
-    return bool(
-        np.abs(points @ turn.rotation.T - points[turn.corners]).max() < SAME_SHARE * np.ptp(points[:, :2])
-    )
 
 
 def in_one_order(flat: Calibration) -> Calibration:
@@ -96,6 +64,8 @@ def in_one_order(flat: Calibration) -> Calibration:
         or len(flat.detections.views) < FEWEST_ORDERED_VIEWS
         or flat.camera.lens_frame is not None
     ):
+        return flat
+    if len(flat.detections.views) >= QUICK_LOOK_VIEWS and not _may_gain(flat, turns):
         return flat
     chosen = _chosen(_Sums.of(flat, turns))
     if not chosen.any():
@@ -117,6 +87,17 @@ def in_one_order(flat: Calibration) -> Calibration:
         outliers.append(outlier._replace(id=int(corners[outlier.id])))
     detections = replace(flat.detections, views=tuple(views), outliers=tuple(outliers))
     return replace(flat, detections=detections, camera_from_target=tuple(poses))
+
+
+def _may_gain(flat: Calibration, turns: list[Turn]) -> bool:
+    """Whether turns may be surely better, at a quick look."""
+    points = flat.detections.target.points
+    smooth = polynomials(points, np.ones(len(points), dtype=bool))
+    chosen, gain, noise = likely_turns(
+        flat, smooth, [shown_by(turn, smooth, 0) for turn in turns], 1.0 / _likely_size(points) ** 2
+    )
+    turned = int((least_turned(chosen, turns_after(turns)) > 0).sum())
+    return gain > QUICK_LOOK_SHARE * SURE_GAIN * noise * max(turned, 1)
 
 
 def listed_as_known(camera: Camera, detections: Detections, shape: TargetShape | None) -> Detections:
@@ -172,7 +153,7 @@ class _Sums:
         smooth = polynomials(points, np.ones(p, dtype=bool))
         r, k, square = smooth.shape[1], len(free), 0.0
         gram, right = np.empty((m, len(turns), k + 3 * r, k + 3 * r)), np.empty((m, len(turns), k + 3 * r))
-        shown = [_shown(turn, smooth, k) for turn in turns]
+        shown = [shown_by(turn, smooth, k) for turn in turns]
         buffer = np.empty((min(m, VIEWS_AT_ONCE), k + 3 * r, 2 * p))
         for start in range(0, m, VIEWS_AT_ONCE):
             rows = slice(start, start + VIEWS_AT_ONCE)
@@ -191,10 +172,9 @@ class _Sums:
             for i, turned in enumerate(shown):
                 gram[rows, i], right[rows, i] = turned.T @ unturned @ turned, pulls @ turned
         freedom = 2 * observations.corners - 6 * m - k
-        size = float(np.ptp(points[:, :2], axis=0).max())
-        precision = square / max(freedom, 1) / (LIKELY_SHARE * size) ** 2
+        precision = square / max(freedom, 1) / _likely_size(points) ** 2
         prior = np.diag(np.concatenate([1e-9 * np.diag(gram[:, 0].sum(0))[:k], np.full(3 * r, precision)]))
-        return cls(gram, right, prior, square, freedom, k, _after(turns))
+        return cls(gram, right, prior, square, freedom, k, turns_after(turns))
 
     def only(self, views: Int[ndarray, " v"]) -> _Sums:
         """Those of some views."""
@@ -250,7 +230,7 @@ def _chosen(sums: _Sums) -> Int[ndarray, " m"]:
     else:
         some = sums.only(sums.telling(SEARCHED_VIEWS))
         (best,) = _settled(sums, some.told(_searched(some)[None])[0])
-    best = _least_turned(best, sums.after)
+    best = least_turned(best, sums.after)
     (x,), (cost,) = sums.told(best[None])
     noise = max(sums.square + cost, 1e-12 * sums.square) / max(sums.freedom, 1)
     needed = SURE_GAIN * noise * max(int((best > 0).sum()), 1)
@@ -283,27 +263,9 @@ def _settled(sums: _Sums, x: Float[ndarray, "s c"]) -> Int[ndarray, "s m"]:
     return tried
 
 
-def _least_turned(chosen: Int[ndarray, " m"], after: Int[ndarray, "g g"]) -> Int[ndarray, " m"]:
-    """The same order of all views against each other, with as few of them turned as can be."""
-    return min((seen_from[chosen] for seen_from in after), key=lambda some: int((some > 0).sum()))
-
-
-def _shown(turn: Turn, smooth: Float[ndarray, "p r"], named: int) -> Float[ndarray, "c c"]:
-    """What a turned view sees of camera and shape, in the same unknowns: smooth shapes of the whole target,
-    turned, are such shapes again.
-    """
-    of_smooth = np.linalg.lstsq(smooth, smooth[turn.corners], rcond=None)[0]
-    r = smooth.shape[1]
-    shown = np.eye(named + 3 * r)
-    shown[named:, named:] = np.einsum("st,ab->sbta", of_smooth, turn.rotation).reshape(3 * r, 3 * r)
-    return shown
-
-
-def _after(turns: list[Turn]) -> Int[ndarray, "g g"]:
-    """after[s, t]: what turn t is when the target is looked at as turn s shows it."""
-    number = {turn.corners.tobytes(): i for i, turn in enumerate(turns)}
-    back = [np.argsort(turn.corners) for turn in turns]
-    return np.array([[number[back[s][turn.corners].tobytes()] for turn in turns] for s in range(len(turns))])
+def _likely_size(points: Float[ndarray, "p 3"]) -> float:
+    """Of a smooth shape's coefficients, metres."""
+    return LIKELY_SHARE * float(np.ptp(points[:, :2], axis=0).max())
 
 
 def _without(basis: Float[ndarray, "m n 6"], columns: Float[ndarray, "m n c"]) -> Float[ndarray, "m n c"]:

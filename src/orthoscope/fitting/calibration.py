@@ -90,7 +90,7 @@ class Candidate(NamedTuple):
         target: the kind of the target's shape.
         lens: a formula, or `free`.
         held_out_px: rms over all corners, each view predicted by the others, pixels per point; NaN where no
-            view could judge it.
+            view could judge it, or its fit was stopped on its way.
         standard_error_px: of it, views taken as independent draws.
         loses_px: its held-out error less that of the one that was taken.
         base: the formula under a free lens, or the formula itself.

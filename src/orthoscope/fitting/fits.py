@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.slopes.linearised import Linearised
 from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut
 from orthoscope.fitting.unseen.scatter import Scatter
@@ -39,6 +40,7 @@ class RichestFit(NamedTuple):
     Attributes:
         detections: that it was made from.
         base: the formula under the free lens.
+        flat: a calibration of a flat target with the base alone, which the fit started from.
         known: the fit, linearised.
         left_out: each view left out of it.
         scatter: of its camera.
@@ -48,6 +50,7 @@ class RichestFit(NamedTuple):
 
     detections: Detections
     base: str
+    flat: Calibration
     known: Linearised
     left_out: LeaveOneOut
     scatter: Scatter

@@ -9,6 +9,7 @@ the solver wants.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -69,10 +70,14 @@ class Reprojection:
         self.parameters.check(camera)
         self.free = self.parameters.names
         self._chunks = observations.chunks()
-        self._places = [_places(points[chunk.ids]) for chunk in self._chunks]
+        self._points = points
         widest = max((chunk.u.size for chunk in self._chunks), default=0)
         self._buffer = np.empty((len(self.free) + POSE + 1) * 2 * widest)
         self._views = len(observations.order)
+
+    @cached_property
+    def _places(self) -> list[Places]:
+        return [_places(self._points[chunk.ids]) for chunk in self._chunks]
 
     def linearise(self, unknowns: Estimate, loss: Loss) -> NormalEquations:
         """The solver's sums at an estimate."""

@@ -25,7 +25,8 @@ LEAST_WIDTH_SHARE = 0.01
 
 
 def with_usable_views(detections: Detections) -> Detections:
-    """The detections; views that tell nothing or tell it twice are set aside with the reason.
+    """The detections, themselves where all views can be used; views that tell nothing or tell it twice are
+    set aside with the reason.
 
     Raises:
         CalibrationError: no view is left.
@@ -50,6 +51,8 @@ def with_usable_views(detections: Detections) -> Detections:
             f"no view of {detections.target.name} can be used; expected at least 1, better 15 from different"
             f" sides. Take photographs that show the whole target, sharp and large.{reasons}"
         )
+    if len(kept) == len(detections.views):
+        return detections
     return replace(detections, views=tuple(kept), set_aside=tuple(aside))
 
 

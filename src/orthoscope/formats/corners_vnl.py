@@ -20,6 +20,7 @@ from operator import ne
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from orthoscope.files.whole_files import read_text, write_text
@@ -188,12 +189,13 @@ def _is_row(stripped: str) -> bool:
 
 def _numbers(words: list[str], table: _Table, path: str | Path) -> ndarray:
     """One column; NaN for a dash."""
-    try:
-        numbers = np.array(
-            list(map(float, ["nan" if word == "-" else word for word in words] if "-" in words else words))
-        )
-    except ValueError:
-        numbers = np.full(len(words), np.nan)
+    told = ["null" if word == "-" else word for word in words] if "-" in words else words
+    try:  # four times as fast as Python's own, which takes more ways to write a number
+        numbers = np.array(msgspec.json.decode(f"[{','.join(told)}]", type=list[float | None]), dtype=float)
+    except msgspec.DecodeError:
+        numbers = np.empty(0)
+    if len(numbers) != len(words):
+        numbers = np.array([float(word) if _is_number(word) else np.nan for word in words])
     for i in np.flatnonzero(~np.isfinite(numbers)).tolist():
         if words[i] != "-" and not _is_number(words[i]):
             raise InputError(

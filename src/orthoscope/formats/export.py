@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -171,51 +172,89 @@ def exportable(camera: Camera, tool: str, *, made_from: Calibration | None = Non
         assert holding is not None, "nothing is lacking"
         beyond = share_beyond(camera, holding.farthest_deg)
         return Exportable(camera, 0.0, 0.0, where, "", beyond)
-    rays = camera.unproject(frame_grid(camera.image_size) if made_from is None else _corners(made_from))
-    rays = rays[np.isfinite(rays).all(1)]
-    if not len(rays):
-        raise CalibrationError(
-            "the lens has no image within the frame: no camera is like it. Mend its numbers."
-        )
-    other, holding = _nearest(camera, rays, record)
-    apart = np.hypot(*(other.project(rays) - camera.project(rays)).T)
+    other, holding = _nearest(camera, made_from, record)
+    rays, wanted = _seen(camera, made_from)
+    apart = np.hypot(*(other.project(rays) - wanted).T)
     beyond = share_beyond(other, holding.farthest_deg)
     return Exportable(other, float(apart.mean()), float(apart.max()), where, lacks, beyond)
 
 
-def _nearest(camera: Camera, rays: Float[ndarray, "n 3"], record: Format) -> tuple[Camera, Holding]:
-    """The camera of the tool whose image of the rays is nearest to this camera's, in pixels."""
-    wanted = camera.project(rays)
-    frame = camera.lens_frame or camera.intrinsics
-    skew = frame.skew if record.skew else 0.0
-    focal = FOCAL if record.two_focals else ("fx=fy", "cx", "cy")
-    if record.skew:
-        focal = (*focal, "skew")
-    fy = frame.fy if record.two_focals else frame.fx
-    plain = replace(camera, intrinsics=Intrinsics(frame.fx, fy, frame.cx, frame.cy, skew), lens_frame=None)
-    near: list[tuple[float, Camera, Pairs]] = []
-    for text in record.lenses:
-        kind, free = parse_lens(text)
-        starts = [replace(plain, lens=kind(**start)) for start in kind.starts]
+def _nearest(camera: Camera, made_from: Calibration | None, record: Format) -> tuple[Camera, Holding]:
+    """The camera of the tool whose image of what was seen is nearest to this camera's, in pixels."""
+    focal = (*(FOCAL if record.two_focals else ("fx=fy", "cx", "cy")), *(("skew",) if record.skew else ()))
+    near: list[_Near] = []
+    for lens in record.lenses:
         try:
-            problem = about_principal_point(rays, wanted, (*focal, *free))
-            other = fit_pairs(problem, starts, options=ROUGH_OPTIONS).unknowns
+            other = _fitted(camera, made_from, lens, focal)
         except CalibrationError:
             continue
-        apart = ((other.project(rays) - wanted) ** 2).sum()
-        if np.isfinite(apart) and record.holding(other.with_unit_scale().lens):
-            near.append((float(apart), other, problem))
+        if np.isfinite(other.apart) and record.holding(other.camera.with_unit_scale().lens):
+            near.append(other)
     if not near:
         raise CalibrationError(
             f"none of {', '.join(record.lenses)} sees as far from the axis as this camera does. Use a tool"
             f" with a"
             " lens of the angle."
         )
-    _, other, problem = min(near, key=lambda entry: entry[0])
-    other = fit_pairs(problem, [other]).unknowns.with_unit_scale()
+    other = _exact(min(near, key=lambda other: other.apart))
     holding = record.holding(other.lens)
     assert holding is not None, "it was held before the last steps"
     return other, holding
+
+
+class _Near(NamedTuple):
+    """A camera with another lens, how far its images are apart from those it was fitted to (squares summed),
+    and the problem of that fit.
+    """
+
+    camera: Camera
+    apart: float
+    problem: Pairs
+
+
+@lru_cache(maxsize=16)
+def _fitted(camera: Camera, made_from: Calibration | None, lens: str, focal: tuple[str, ...]) -> _Near:
+    """The camera with this lens that is nearest, but for the last digits; found once for all tools that have
+    the lens.
+
+    Args:
+        focal: the parameters of K that move.
+    Raises:
+        CalibrationError: the lens does not see so far.
+    """
+    rays, wanted = _seen(camera, made_from)
+    frame = camera.lens_frame or camera.intrinsics
+    fy, skew = frame.fy if "fy" in focal else frame.fx, frame.skew if "skew" in focal else 0.0
+    plain = replace(camera, intrinsics=Intrinsics(frame.fx, fy, frame.cx, frame.cy, skew), lens_frame=None)
+    kind, free = parse_lens(lens)
+    problem = about_principal_point(rays, wanted, (*focal, *free))
+    starts = [replace(plain, lens=kind(**start)) for start in kind.starts]
+    other = fit_pairs(problem, starts, options=ROUGH_OPTIONS).unknowns
+    return _Near(other, float(((other.project(rays) - wanted) ** 2).sum()), problem)
+
+
+@lru_cache(maxsize=4)
+def _exact(near: _Near) -> Camera:
+    """The same to the last digits."""
+    return fit_pairs(near.problem, [near.camera]).unknowns.with_unit_scale()
+
+
+@lru_cache(maxsize=2)
+def _seen(
+    camera: Camera, made_from: Calibration | None
+) -> tuple[Float[ndarray, "n 3"], Float[ndarray, "n 2"]]:
+    """Rays by which cameras are compared, and their pixels.
+
+    Raises:
+        CalibrationError: the camera sees nothing.
+    """
+    rays = camera.unproject(frame_grid(camera.image_size) if made_from is None else _corners(made_from))
+    rays = rays[np.isfinite(rays).all(1)]
+    if not len(rays):
+        raise CalibrationError(
+            "the lens has no image within the frame: no camera is like it. Mend its numbers."
+        )
+    return rays, camera.project(rays)
 
 
 def _corners(calibration: Calibration) -> Float[ndarray, "n 2"]:

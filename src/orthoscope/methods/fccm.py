@@ -10,8 +10,9 @@ Steps as in Zhang's section 3, for any lens of LENSES, partial boards and lenses
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -35,7 +36,8 @@ from orthoscope.methods.own_centre import CENTRE_OPEN, with_own_centre
 from orthoscope.models.lenses.table import parse_lens
 from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
 from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Loss
-from orthoscope.targets.detections import Detections
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target
 from orthoscope.version import __version__
 
 __all__ = ["fccm", "fit_flat"]
@@ -119,10 +121,8 @@ def fit_flat(
     if loss not in LOSSES:
         raise InputError(f"loss {loss!r} is not known; expected one of {', '.join(LOSSES)}.")
     used = with_usable_views(detections)
-    narrowing = Assumptions.of(len(used.views), skew=skew)
-    observations = Observations.of(used)
-    sample = observations.thinned(SAMPLE_CORNERS)
-    bases = StartingCameras(sample, used.target.points, used.image_size, narrowing)
+    observations, bases = _starting(used.views, used.target, used.image_size, skew)
+    narrowing, sample = bases.narrowing, bases.observations
     lens = suited_lens(bases) if lens == AUTO else lens
     kind, coefficients = (parse_centred_lens if own_centre else parse_lens)(lens)
     free = (*narrowing.free, *coefficients)
@@ -131,14 +131,13 @@ def fit_flat(
         LOSSES[loss](loss_scale),
         Options(max_steps=max_steps, tolerance=COST_TOLERANCE, trusting=True, progress=progress),
     )
-    estimates = starts(bases, kind, coefficients=coefficients)
+    estimates: Iterable[Estimate] = starts(bases, kind, coefficients=coefficients)
     if sample is not observations:
-        estimates = [_nearer(estimate, bases, free, cost) for estimate in estimates]
+        estimates = map(partial(_nearer, bases=bases, free=free, loss=cost), estimates)
     solution = _best(estimates, observations, used, free, cost, options)
     if len(used.views) > 2 and _is_doubtful(solution, bases):
-        more = [
-            _nearer(estimate, bases, free, cost) for estimate in starts_elsewhere(bases, kind, coefficients)
-        ]
+        elsewhere = starts_elsewhere(bases, kind, coefficients)
+        more = map(partial(_nearer, bases=bases, free=free, loss=cost), elsewhere)
         solution = _best(more, observations, used, free, cost, options, best=solution)
     centred = None
     if own_centre:
@@ -180,7 +179,20 @@ def fit_flat(
     )
 
 
-def _nearer(start: Estimate, bases: StartingCameras, free: tuple[str, ...], loss: Loss) -> Estimate:
+@lru_cache(maxsize=2)
+def _starting(
+    views: tuple[View, ...], target: Target, image_size: tuple[int, int], skew: bool
+) -> tuple[Observations, StartingCameras]:
+    """The views' corners, and where a calibration of them starts, whatever its lens: who tries several lenses
+    asks for it several times.
+    """
+    observations = Observations.of(Detections(target, image_size, views))
+    narrowing = Assumptions.of(len(views), skew=skew)
+    sample = observations.thinned(SAMPLE_CORNERS)
+    return observations, StartingCameras(sample, target.points, image_size, narrowing)
+
+
+def _nearer(start: Estimate, *, bases: StartingCameras, free: tuple[str, ...], loss: Loss) -> Estimate:
     """A start brought near the minimum on the bases' sample of corners, with the parameters that it tells."""
     firm = [name for name in free if name not in start.camera.lens.names()[FIRM_COEFFICIENTS:]]
     return solve(
@@ -205,7 +217,7 @@ def _is_doubtful(solution: Solution[Estimate], bases: StartingCameras) -> bool:
 
 
 def _best(
-    estimates: list[Estimate],
+    estimates: Iterable[Estimate],
     observations: Observations,
     used: Detections,
     free: tuple[str, ...],
@@ -217,9 +229,10 @@ def _best(
     """The joint refinement from the first start that ends well and without a long walk, or else the best of
     all; and of all of them, where one is known.
     """
-    known = best
+    known, first = best, None
     enough = used.corners * float(loss.cost(np.array((ADEQUATE_SHARE * np.hypot(*used.image_size)) ** 2)))
     for estimate in estimates:
+        first = first or estimate
         problem = Reprojection(observations, used.target.points, estimate.camera, free)
         solution = solve(problem, estimate, loss=loss, options=options)
         if (
@@ -234,7 +247,8 @@ def _best(
         if ends_well and known is None and (solution.steps < LONG_WALK_STEPS or used.corners > FEW_CORNERS):
             break
     if best is None:
-        raise CalibrationError(_no_start(estimates[0], observations, used))
+        assert first is not None, "there is a start"
+        raise CalibrationError(_no_start(first, observations, used))
     return best
 
 

@@ -33,6 +33,8 @@ EDGE_PX = 1e-3
 BISECTION_STEPS = 14
 # Another middle of a straight view must be better by this share.
 GAIN_SHARE = 1e-3
+# The last pixel with a ray is found to this share of its distance from the middle.
+BORDER_SHARE = 1e-6
 # No image has a side of more pixels; a file that says so is damaged.
 LARGEST_SIDE = 1_000_000
 # Rays farther from the axis than this, radians, a pin-hole stretches without end.
@@ -375,17 +377,15 @@ class Camera:
         """Rays of the image's border; where a border pixel has none within `widest`, of the last pixel
         towards the centre that has.
         """
-        inside, outside = np.zeros(len(border)), np.ones(len(border))
-        for _ in range(40):
-            rays = self.unproject(centre + outside[:, None] * (border - centre))
-            if (good := rays[:, 2] >= np.cos(widest)).all():
-                return rays
-            middle = np.where(good, outside, 0.5 * (inside + outside))
-            reached = self.unproject(centre + middle[:, None] * (border - centre))[:, 2] >= np.cos(widest)
+        rays = self.unproject(border)
+        lost = np.flatnonzero(~(rays[:, 2] >= np.cos(widest)))
+        inside, outside, line = np.zeros((len(lost), 1)), np.ones((len(lost), 1)), border[lost] - centre
+        while len(lost) and (outside - inside).max() >= BORDER_SHARE:
+            middle = 0.5 * (inside + outside)
+            reached = self.unproject(centre + middle * line)[:, 2:] >= np.cos(widest)
             inside, outside = np.where(reached, middle, inside), np.where(reached, outside, middle)
-            if (outside - inside).max() < 1e-6:
-                break
-        return self.unproject(centre + inside[:, None] * (border - centre))
+        rays[lost] = self.unproject(centre + inside * line)
+        return rays
 
 
 def image_border(image_size: tuple[int, int], samples: int = 64) -> Float[ndarray, "n 2"]:

@@ -88,7 +88,10 @@ def smooth_map(
     )
     maps = _interpolated(values, across, down, size)
     unsure = [np.empty((0, 2), dtype=np.int64)]
-    for row, run in _runs(plain & ~_inside(values, within)):
+    inside, outside = _sure(values, within)
+    for row, run in _runs(plain & outside):
+        maps[:, down.pixels(row, height), across.pixels(run, width)] = np.nan
+    for row, run in _runs(plain & ~inside & ~outside):
         rows, columns = down.pixels(row, height), across.pixels(run, width)
         unsure.append(_cut(maps[:, rows, columns], within) + np.array([columns.start, rows.start]))
     for row, run in _runs(~plain):
@@ -160,17 +163,18 @@ def _interpolated(
     values: ndarray, across: _Tiles, down: _Tiles, size: tuple[int, int]
 ) -> Float[ndarray, "2 h w"]:
     """The polynomials at every pixel; in single precision but for the tile's first row, from which the others
-    differ little.
+    differ little, and which is added last.
     """
     width, height = size
     rows = _spread(values, _weights(np.arange(across.side) / across.side))[:, :, :width]
-    weights = _weights(np.arange(down.side) / down.side).astype(np.float32)
+    weights = np.ones((down.side, N + 1), dtype=np.float32)
+    weights[:, :N] = _weights(np.arange(down.side) / down.side)
     maps = np.empty((2, height, width), dtype=np.float32)
     for tile in range(down.number):
         pixels, points = down.pixels(slice(tile, tile + 1), height), slice(tile * (N - 1), tile * (N - 1) + N)
         for part, along in zip(maps[:, pixels], rows[:, points], strict=True):
-            np.matmul(weights[: len(part)], (along - along[0]).astype(np.float32), out=part)
-            part += along[0].astype(np.float32)
+            from_first = np.concatenate([along - along[0], along[:1]]).astype(np.float32)
+            np.matmul(weights[: len(part)], from_first, out=part)
     return maps
 
 
@@ -186,9 +190,11 @@ def _errors(look: Look, values: ndarray, across: _Tiles, down: _Tiles) -> Float[
     return missed.reshape(2, down.number, N - 1, across.number, N - 1).max((0, 2, 4))
 
 
-def _inside(values: ndarray, within: _Limits) -> Bool[ndarray, "rows columns"]:
-    """Tiles that surely keep within the limits: their bilinear part is farthest out in a corner, and the rest
-    of them is small.
+def _sure(
+    values: ndarray, within: _Limits
+) -> tuple[Bool[ndarray, "rows columns"], Bool[ndarray, "rows columns"]]:
+    """Tiles that surely keep within the limits, and those that surely lie outside: their bilinear part is
+    farthest out and farthest in in a corner, and the rest of them is small.
     """
     middle, reach = within.middle[:, None, None], within.reach[:, None, None]
     corners, t = values[:, :: N - 1, :: N - 1], _points()[:, None, None]
@@ -199,7 +205,10 @@ def _inside(values: ndarray, within: _Limits) -> Bool[ndarray, "rows columns"]:
         :, :, None, :, 1:
     ]  # (2, N, N, tiles down, tiles across)
     rest = np.abs(np.moveaxis(_windows(_windows(values, 1), 2), (3, 4), (1, 2)) - bilinear).max((1, 2))
-    return (_of_corners(np.maximum, np.abs(corners - middle)) + LEBESGUE_CONSTANT * rest < reach).all(0)
+    most, least = (_of_corners(which, corners - middle) for which in (np.maximum, np.minimum))
+    rest *= LEBESGUE_CONSTANT
+    inside = (np.maximum(most, -least) + rest < reach).all(0)
+    return inside, (np.maximum(least, -most) - rest > reach).any(0)
 
 
 def _runs(flags: Bool[ndarray, "rows columns"]) -> Iterator[tuple[slice, slice]]:

@@ -39,15 +39,19 @@ def field_of_view(camera: Camera) -> FieldOfView:
         float(np.clip(at, 0.0, side - 1.0))
         for at, side in zip((camera.intrinsics.cx, camera.intrinsics.cy), camera.image_size, strict=True)
     )
-    diagonals = _swept(camera, (left, top), (right, bottom)), _swept(camera, (left, bottom), (right, top))
-    return FieldOfView(
-        _swept(camera, (left, y), (right, y)), _swept(camera, (x, top), (x, bottom)), max(diagonals)
+    ends = (
+        ((left, y), (right, y)),
+        ((x, top), (x, bottom)),
+        ((left, top), (right, bottom)),
+        ((left, bottom), (right, top)),
     )
+    pixels = np.concatenate([np.linspace(start, end, LINE_STEPS + 1) for start, end in ends])
+    horizontal, vertical, *diagonals = map(_swept, np.split(camera.unproject(pixels), len(ends)))
+    return FieldOfView(horizontal, vertical, max(diagonals))
 
 
-def _swept(camera: Camera, start: tuple[float, float], end: tuple[float, float]) -> float:
-    """The angle that the rays sweep from one pixel to another, radians."""
-    rays = camera.unproject(np.linspace(start, end, LINE_STEPS + 1))
+def _swept(rays: Float[ndarray, "n 3"]) -> float:
+    """The angle that rays sweep from the first to the last, radians."""
     steps = _angles(rays[:-1], rays[1:])
     return float(np.nansum(steps)) if np.isfinite(steps).any() else float("nan")
 

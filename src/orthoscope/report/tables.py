@@ -233,7 +233,7 @@ def candidate_rows(calibration: Calibration) -> list[CandidateRow]:
     for one in calibration.candidates:
         value, error = value_with_deviation(one.held_out_px, one.standard_error_px)
         loses = "taken" if one.loses_px == 0.0 else pixels(one.loses_px)
-        over = f" over {one.base}" if one.base and one.base != one.lens and one.fit == "joint" else ""
+        over = f" on {one.base}" if one.base and one.base != one.lens and one.fit == "joint" else ""
         how = {"joint": "with the poses", "pairs": "from pairs"}[one.fit]
         rows.append(
             CandidateRow(one.target, one.lens + over, how, str(one.views or ABSENT), value, error, loses)

@@ -30,9 +30,12 @@ __all__ = [
     "Problem",
     "Solution",
     "Status",
+    "after_step",
+    "blocks_times",
     "eliminated",
     "inverse_roots",
     "shared_covariance",
+    "side_by_side",
     "solve",
 ]
 
@@ -44,6 +47,10 @@ LEAST_DAMPING = 1e-15
 MOST_DAMPING = 1e12
 # An eigenvalue of the scaled shared system that is no larger is rounding: nothing was measured there.
 LARGEST_OPEN_EIGENVALUE = 1e-14
+# Promises shrink alike where the share of one and that of the next differ by less than this.
+STEADY_SHARE = 0.2
+# No step is made longer than so many times.
+LONGEST_STEP = 10.0
 # Views are eliminated so many numbers at a time (16 MB).
 NUMBERS_AT_ONCE = 1 << 21
 # Blocks of more unknowns are not inverted, and solved so many rows at a time.
@@ -181,6 +188,7 @@ def solve(
     if not np.isfinite(sums.cost):
         return Solution(here, sums, 0, Status.NO_COST)
     damping, steps, before = _Damping(options.damping), 0, 0.0
+    pace = _Pace()
     while True:
         shared, views, promised = _damped_step(sums, damping.value, options.damp)
         if status := _ending(sums, promised, damping.value, steps, options):
@@ -192,18 +200,21 @@ def solve(
                 problem.move(here, shared, views), _lowered(sums, promised), steps, Status.CONVERGED
             )
         before = 0.0
-        there, trial, gained = here, sums, -np.inf
+        there, trial, gained, length = here, sums, -np.inf, 1.0
         if 0.0 < promised < np.inf:
-            there = problem.move(here, shared, views)
+            length = pace.length(promised)
+            there = problem.move(here, length * shared, length * views)
             trial = problem.linearise(there, loss)
             gained = sums.cost - trial.cost  # NaN or -inf where there is no solution
         if gained >= 0.0:
-            here, sums, before = there, trial, promised
+            here, sums, before = there, trial, promised if length == 1.0 else 0.0
             damping.loosen(gained / promised)
+            pace.took(gained / promised)
             if options.progress:
                 options.progress(steps, sums.cost)
         else:
             damping.tighten()
+            pace = _Pace()
 
 
 def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray, "k k"]:
@@ -233,6 +244,23 @@ def shared_covariance(sums: NormalEquations, measurements: int) -> Float[ndarray
     return covariance
 
 
+def after_step(
+    sums: NormalEquations, shared: Float[ndarray, " k"], views: Float[ndarray, "m p"]
+) -> NormalEquations:
+    """The sums where a step leads, as far as residuals are linear.
+
+    Args:
+        sums: those before it.
+        shared: the shared step, (k,).
+        views: each view's step, (m,p).
+    """
+    B = side_by_side(sums.B)
+    a = sums.a + sums.A @ shared + B @ views.T.ravel()
+    c = sums.c + (shared @ B).reshape(views.T.shape).T + (sums.C @ views[:, :, None])[:, :, 0]
+    cost = sums.cost + float((sums.a + a) @ shared + ((sums.c + c) * views).sum())
+    return sums._replace(cost=cost, a=a, c=c)
+
+
 class _Damping:
     """lambda, after Nielsen: less the better a step kept its promise, ever more after steps up the cost.
 
@@ -251,6 +279,33 @@ class _Damping:
     def tighten(self) -> None:
         """After a step that was not taken."""
         self.value, self._growth = self._growth * max(self.value, 1e-12), 4.0 * self._growth
+
+
+class _Pace:
+    """How long a step is best.
+
+    In a curved valley promises shrink by the same share time after time, as each step goes as much too far,
+    or not far enough: a step that gains g times what it promised is 2 - g times as long as is best.
+    """
+
+    def __init__(self) -> None:
+        self._promises: list[float] = []
+        self._gain = 1.0
+
+    def length(self, promised: float) -> float:
+        """Of the next step, in steps as they are."""
+        self._promises.append(promised)
+        if len(self._promises) < 3:
+            return 1.0
+        first, second, third = self._promises[-3:]
+        if not (third < second and abs(third * first / second**2 - 1.0) < STEADY_SHARE and self._gain < 2.0):
+            return 1.0
+        self._promises.clear()
+        return min(1.0 / (2.0 - self._gain), LONGEST_STEP)
+
+    def took(self, gain: float) -> None:
+        """Says what the step gained, as a share of its promise."""
+        self._gain = gain
 
 
 def _ending(
@@ -305,10 +360,11 @@ def _damped_step(sums: NormalEquations, damping: float, damp: str) -> tuple[ndar
     try:
         system, solved = (_with_triangles if C.shape[2] > WIDEST_INVERTED else _with_inverses)(sums, C)
         system[np.diag_indices_from(system)] += of_shared
-        shared = -np.linalg.solve(system, sums.a - np.einsum("mkp,mp->k", sums.B, solved(sums.c)))
+        B = side_by_side(sums.B)
+        shared = -np.linalg.solve(system, sums.a - B @ solved(sums.c).T.ravel())
     except np.linalg.LinAlgError:  # singular as far as numbers go
         return np.zeros_like(sums.a), np.zeros_like(sums.c), float("nan")
-    views = -solved(sums.c + shared @ sums.B)
+    views = -solved(sums.c + (shared @ B).reshape(sums.c.T.shape).T)
     damped = of_shared @ shared**2 + (of_views * views**2).sum()
     return shared, views, float(-(sums.a @ shared) - (sums.c * views).sum() + damped)
 
@@ -366,9 +422,21 @@ def eliminated(sums: NormalEquations, roots: Float[ndarray, "m p p"]) -> Float[n
     at_once = max(1, NUMBERS_AT_ONCE // max(k * p, 1))
     for start in range(0, m, at_once):
         some = slice(start, start + at_once)
-        W = (sums.B[some] @ roots[some]).transpose(1, 0, 2).reshape(k, len(roots[some]) * p)
+        W = blocks_times(sums.B[some], roots[some]).reshape(k, p * len(roots[some]))
         left -= W @ W.T
     return left
+
+
+def side_by_side(B: Float[ndarray, "m k p"]) -> Float[ndarray, "k c"]:
+    """All blocks beside each other, the first column of each first; no copy where they are stored so."""
+    m, k, p = B.shape
+    return B.transpose(1, 2, 0).reshape(k, p * m)
+
+
+def blocks_times(B: Float[ndarray, "m k p"], G: Float[ndarray, "m p p"]) -> Float[ndarray, "k p m"]:
+    """B G of every block, laid out as `side_by_side` wants it: all blocks at once, entry by entry."""
+    factors = np.ascontiguousarray(G.transpose(1, 2, 0))
+    return np.einsum("kim,ijm->kjm", B.transpose(1, 2, 0), factors)
 
 
 def inverse_roots(C: Float[ndarray, "m p p"]) -> Float[ndarray, "m p p"]:

@@ -3,8 +3,8 @@
 A = L L',  A^-1 = L^-T L^-1.  numpy has no routine for the inverse of a triangle; halves give it with products
 alone, which BLAS does three times as fast as the general inverse of these sizes:
 
-    [ L1  0  ]^-1   [      L1^-1            0    ]
-    [ M   L2 ]    = [ -L2^-1 M L1^-1      L2^-1  ]
+    [ L1  0  ]^-1   [      L1^-1            0    ]        [ L1  0  ]' [ L1  0  ]   [ L1'L1 + M'M   M'L2  ]
+    [ M   L2 ]    = [ -L2^-1 M L1^-1      L2^-1  ]        [ M   L2 ]  [ M   L2 ] = [     L2'M      L2'L2 ]
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ __all__ = ["positive_inverse"]
 
 # This is added to a scaled system's diagonal before it is inverted.
 ROUNDING_SHARE = 1e-13
-# A triangle of so many rows is left to the general inverse.
+# A triangle of so many rows is left to the general routines.
 SMALL_SIDE = 48
 
 
@@ -28,23 +28,43 @@ def positive_inverse(matrix: Float[ndarray, "n n"]) -> Float[ndarray, "n n"]:
         LinAlgError: the matrix is singular.
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix * scale * scale[:, None]
+    scaled = matrix * scale
+    scaled *= scale[:, None]
     scaled[np.diag_indices_from(scaled)] += ROUNDING_SHARE
     try:
-        root = _inverse_of_triangle(np.linalg.cholesky(scaled)) * scale
+        lower = np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:  # not positive, as far as numbers go
         inverse = np.linalg.inv(scaled)
         return 0.5 * (inverse + inverse.T) * scale * scale[:, None]
-    return root.T @ root
+    _invert_triangle(lower)
+    lower *= scale
+    _square_triangle(lower, into=scaled)
+    return scaled
 
 
-def _inverse_of_triangle(lower: Float[ndarray, "n n"]) -> Float[ndarray, "n n"]:
+def _invert_triangle(lower: Float[ndarray, "n n"]) -> None:
+    """In its place."""
     n = len(lower)
     if n <= SMALL_SIDE:
-        return np.linalg.inv(lower)
+        lower[:] = np.linalg.inv(lower)
+        return
     half = n // 2
-    first, second = _inverse_of_triangle(lower[:half, :half]), _inverse_of_triangle(lower[half:, half:])
-    inverse = np.zeros_like(lower)
-    inverse[:half, :half], inverse[half:, half:] = first, second
-    inverse[half:, :half] = -(second @ lower[half:, :half]) @ first
-    return inverse
+    first, below, second = lower[:half, :half], lower[half:, :half], lower[half:, half:]
+    _invert_triangle(first)
+    _invert_triangle(second)
+    below[:] = -(second @ below) @ first
+
+
+def _square_triangle(lower: Float[ndarray, "n n"], *, into: Float[ndarray, "n n"]) -> None:
+    """L'L."""
+    n = len(lower)
+    if n <= SMALL_SIDE:
+        np.matmul(lower.T, lower, out=into)
+        return
+    half = n // 2
+    first, below, second = lower[:half, :half], lower[half:, :half], lower[half:, half:]
+    _square_triangle(first, into=into[:half, :half])
+    into[:half, :half] += below.T @ below
+    _square_triangle(second, into=into[half:, half:])
+    np.matmul(second.T, below, out=into[half:, :half])
+    into[:half, half:] = into[half:, :half].T

@@ -23,7 +23,7 @@ def photographs() -> Detections:
 
 
 def test_what_is_compared_foresees_as_what_is_kept(photographs: Detections):
-    compared = Candidates(photographs, skew=False, fitter=Compared(photographs, skew=False, flats={}))
+    compared = Candidates(photographs, skew=False, fitter=Compared(photographs, skew=False))
     kept = Candidates(photographs, skew=False)
     for model in (RICHEST, PLAIN):
         ours, theirs = (np.sqrt(one.contender(model).squares) for one in (compared, kept))
@@ -31,11 +31,11 @@ def test_what_is_compared_foresees_as_what_is_kept(photographs: Detections):
 
 
 def test_what_is_kept_is_the_same_whatever_it_was_compared_with(photographs: Detections):
-    compared = Compared(photographs, skew=False, flats={})
+    compared = Compared(photographs, skew=False)
     for model in (RICHEST, PLAIN):
         compared.step_one(model)
     for model in (RICHEST, PLAIN):
-        ours = Kept(photographs, skew=False, cold=compared.cold).step_one(model)
+        ours = Kept(photographs, skew=False, compared=compared).step_one(model)
         alone = Kept(photographs, skew=False).step_one(model)
         assert ours.estimate.camera.intrinsics.as_tuple() == alone.estimate.camera.intrinsics.as_tuple()
 
@@ -51,7 +51,8 @@ def test_many_views_are_fitted_by_way_of_some(photographs: Detections, monkeypat
         np.array(some_first.estimate.camera.intrinsics.as_tuple()[:4])
         - straight.estimate.camera.intrinsics.as_tuple()[:4]
     )
-    assert (apart < 0.05 * deviations[:4]).all()
+    # Weights are found in a few rounds, and these had those of the eight views before them.
+    assert (apart < 0.1 * deviations[:4]).all()
 
 
 def test_views_that_stand_for_all_do_not_depend_on_their_order(photographs: Detections):

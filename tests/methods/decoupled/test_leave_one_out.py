@@ -13,7 +13,7 @@ from helpers.scenes import NARROW
 from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.slopes.linearised import Linearised
-from orthoscope.fitting.unseen.leave_one_out import hat_of, leave_one_out
+from orthoscope.fitting.unseen.leave_one_out import leave_one_out, say_of
 from orthoscope.fitting.unseen.near_copies import near_copies, summed_over
 from orthoscope.methods.decoupled.step_one import StepOneFit, fit_step_one
 from orthoscope.methods.decoupled.step_one_linearised import linearised
@@ -96,7 +96,7 @@ def test_a_view_left_out_by_one_step_is_foreseen_as_by_the_fit_that_never_had_it
 def test_what_a_view_alone_decides_is_no_more_than_itself(fit: tuple[StepOneFit, Linearised]):
     known = fit[1]
     rows = np.random.default_rng(1).standard_normal((*known.residual.shape, 1)) * (known.root > 0)[..., None]
-    share = (rows * hat_of(known, rows)).sum((1, 2)) / (rows**2).sum((1, 2))
+    share = say_of(known, rows)[0][:, 0, 0] / (rows**2).sum((1, 2))
     assert (share >= 0.0).all()
     assert (share < 1.0).all()
 
@@ -114,9 +114,20 @@ def test_views_looked_at_together_or_in_parts_say_the_same(
 ):
     known = fit[1]
     rows = np.random.default_rng(2).standard_normal((*known.residual.shape, 2)) * (known.root > 0)[..., None]
-    together = hat_of(known, rows)
+    together = say_of(known, rows)
     monkeypatch.setattr("orthoscope.fitting.unseen.leave_one_out.VIEWS_AT_ONCE", 3)
-    assert_allclose(hat_of(known, rows), together, rtol=1e-9, atol=1e-9)
+    for part, whole in zip(say_of(known, rows), together, strict=True):
+        assert_allclose(part, whole, rtol=1e-9, atol=1e-12)
+
+
+def test_a_views_say_is_what_the_whole_inverse_says(fit: tuple[StepOneFit, Linearised]):
+    known = fit[1]
+    rows = np.random.default_rng(3).standard_normal((*known.residual.shape, 2)) * (known.root > 0)[..., None]
+    pulls = known.pulls(rows)
+    solved = known.solved(pulls)
+    explained, moved = say_of(known, rows)
+    assert_allclose(explained, pulls.transpose(0, 2, 1) @ solved, rtol=1e-7, atol=1e-9)
+    assert_allclose(moved, solved[:, : known.of_camera], rtol=1e-7, atol=1e-12)
 
 
 def test_of_photographs_that_were_taken_twice_both_are_left_out(photographs: Detections):

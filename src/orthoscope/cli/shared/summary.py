@@ -18,6 +18,8 @@ __all__ = ["camera_numbers", "evaluation_lines", "to_json"]
 
 # So many photographs that were set aside are listed one by one.
 LISTED_PHOTOGRAPHS = 6
+# One photograph makes the held-out error where without it no more than this share is left.
+ONE_MAKES_SHARE = 0.7
 
 
 def evaluation_lines(evaluation: Evaluation, *, verbose: bool = False) -> list[str]:
@@ -37,12 +39,17 @@ def evaluation_lines(evaluation: Evaluation, *, verbose: bool = False) -> list[s
 
 def _camera_line(calibration: Calibration) -> str:
     """K with standard deviations, and the lens's name."""
+    from orthoscope.models.lenses.free import FreeLens
     from orthoscope.models.lenses.table import lens_name
 
     camera, deviations = calibration.camera, calibration.uncertainty.deviations
     values = dict(zip(("fx", "fy", "cx", "cy", "skew"), camera.intrinsics.as_tuple(), strict=True))
     told = [_number(name, value, deviations) for name, value in values.items() if value or name in deviations]
-    return "  ".join([*told, f"lens {lens_name(camera.lens)}"])
+    lens = lens_name(camera.lens)
+    if isinstance(camera.lens, FreeLens):
+        lens += f" on {lens_name(camera.lens.base)}"
+    unsure = "" if deviations else f"  (how sure they are, {calibration.method} does not tell)"
+    return "  ".join([*told, f"lens {lens}"]) + unsure
 
 
 def _photographs_line(evaluation: Evaluation) -> str:
@@ -53,8 +60,25 @@ def _photographs_line(evaluation: Evaluation) -> str:
     parts += [f"{aside} set aside"] if aside else []
     parts += [f"{outliers} corner{'s' if outliers > 1 else ''} left out"] if outliers else []
     if not math.isnan(evaluation.held_out_rms_px):
-        parts.append(f"corners missed by {evaluation.held_out_rms_px:.2g} px where a photograph was not used")
+        parts.append(
+            f"corners missed by {evaluation.held_out_rms_px:.2g} px where a photograph was not used"
+            + _but_for_one(evaluation)
+        )
     return "; ".join(parts) + (" (--verbose says which)" if aside or outliers else "")
+
+
+def _but_for_one(evaluation: Evaluation) -> str:
+    """Which photograph alone makes the held-out error what it is, if one does."""
+    views = [view for view in evaluation.views if not math.isnan(view.held_out_rms_px)]
+    squares = [view.corners * view.held_out_rms_px**2 for view in views]
+    corners = sum(view.corners for view in views)
+    if len(views) < 2:
+        return ""
+    worst = max(range(len(views)), key=lambda i: squares[i])
+    rest = math.sqrt((sum(squares) - squares[worst]) / (corners - views[worst].corners))
+    if rest > ONE_MAKES_SHARE * evaluation.held_out_rms_px:
+        return ""
+    return f" ({rest:.2g} px but for {views[worst].image}, which the others do not foretell)"
 
 
 def _details(evaluation: Evaluation) -> list[str]:
@@ -139,10 +163,11 @@ def _choice_lines(calibration: Calibration) -> list[str]:
     others = [one for one in calibration.candidates if one.loses_px != 0.0]
     if others:
         other = min(others, key=lambda one: math.inf if math.isnan(one.held_out_px) else one.held_out_px)
-        how = f"{'loses' if other.loses_px > 0 else 'would gain'} {pixels(abs(other.loses_px))} px"
+        gains = other.loses_px < 0
         lines.append(
             f"choice     target {settings['shape']}, lens {settings['lens']}, base {settings['base']}; next target"
-            f" {other.target}, lens {other.lens}, base {other.base} {how} held out"
+            f" {other.target}, lens {other.lens}, base {other.base} {'would gain' if gains else 'loses'}"
+            f" {pixels(abs(other.loses_px))} px held out{', which may be chance' if gains else ''}"
         )
     return lines
 

@@ -27,8 +27,6 @@ import numpy as np
 from orthoscope.fitting.slopes.spline_values import SplineValues
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.models.camera import Camera
-from orthoscope.solve.least_squares import NormalEquations, eliminated, inverse_roots
-from orthoscope.solve.positive import positive_inverse
 
 __all__ = ["Linearised", "ResidualSlopes", "SharedInverse"]
 
@@ -69,8 +67,8 @@ class SharedInverse(NamedTuple):
     Attributes:
         covariance: (s,s) the inverse of what was left.
         blocks: (b,3,3) C^-1 of the corners that were eliminated; none where it was the views.
-        crossed: (s,3b) sums of what was left with them. What was left are the shared unknowns, but for these
-            corners, and then the poses.
+        crossed: (s,3b) sums of what was left with them, along the first axis of all corners first. What was
+            left are the shared unknowns, but for these corners, and then the poses.
     """
 
     covariance: Float[ndarray, "s s"]
@@ -78,19 +76,9 @@ class SharedInverse(NamedTuple):
     crossed: Float[ndarray, "s c"]
 
     @classmethod
-    def of(cls, normal: NormalEquations, *, by_corner: bool) -> SharedInverse:
-        """Of the solver's sums, priors included.
-
-        Args:
-            normal: the sums.
-            by_corner: whether single corners were eliminated in them; else the views.
-        """
-        roots, s = inverse_roots(normal.C), len(normal.A)
-        covariance = positive_inverse(eliminated(normal, roots))
-        if not by_corner:
-            return cls(covariance, np.zeros((0, SPACE, SPACE)), np.zeros((s, 0)))
-        crossed = normal.B.transpose(1, 0, 2).reshape(s, -1)
-        return cls(covariance, roots @ roots.transpose(0, 2, 1), crossed)
+    def of_shared(cls, covariance: Float[ndarray, "s s"]) -> SharedInverse:
+        """Where the views were eliminated, and are not asked for."""
+        return cls(covariance, np.zeros((0, SPACE, SPACE)), np.zeros((len(covariance), 0)))
 
     def times(self, pulls: Float[ndarray, "q c"]) -> Float[ndarray, "q c"]:
         """H^-1 times vectors."""
@@ -98,11 +86,29 @@ class SharedInverse(NamedTuple):
             return self.covariance @ pulls
         n, columns, blocks = len(pulls) - self.crossed.shape[1], pulls.shape[1], (len(self.blocks), SPACE, -1)
         scaled = self.blocks @ pulls[n:].reshape(blocks)  # C^-1 b
-        right = -(self.crossed @ scaled.reshape(-1, columns))
+        right = -(self.crossed @ _by_axis(scaled))
         right[:n] += pulls[:n]
         found = self.covariance @ right
-        of_corners = scaled - self.blocks @ (self.crossed.T @ found).reshape(blocks)
-        return np.concatenate([found[:n], of_corners.reshape(-1, columns)])
+        back = (self.crossed.T @ found).reshape(SPACE, len(self.blocks), columns).transpose(1, 0, 2)
+        return np.concatenate([found[:n], (scaled - self.blocks @ back).reshape(-1, columns)])
+
+    def between(
+        self, pulls: Float[ndarray, "m q c"]
+    ) -> tuple[Float[ndarray, "m c c"], Float[ndarray, "m s c"]]:
+        """b'H^-1 b of vectors (q,c) of each view, and the shared unknowns' part of H^-1 b; half the work of
+        `times`.
+        """
+        (m, q, c), s = pulls.shape, len(self.covariance)
+        right, n = np.zeros((s, m * c)), q - self.crossed.shape[1]
+        right[:n] = pulls[:, :n].transpose(1, 0, 2).reshape(n, m * c)
+        squares = np.zeros((m, c, c))
+        if len(self.blocks):
+            own = pulls[:, n:].transpose(1, 0, 2).reshape(len(self.blocks), SPACE, m * c)
+            scaled = self.blocks @ own
+            right -= self.crossed @ _by_axis(scaled)
+            squares = pulls[:, n:].transpose(0, 2, 1) @ scaled.reshape(-1, m, c).transpose(1, 0, 2)
+        found = (self.covariance @ right).reshape(s, m, c).transpose(1, 0, 2)
+        return squares + right.reshape(s, m, c).transpose(1, 2, 0) @ found, found[:, :n]
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,6 +312,11 @@ class Linearised:
     @cached_property
     def _poses(self) -> Float[ndarray, "m n 6"]:
         return _orthonormal(self.slopes.pose.transpose(0, 2, 1))
+
+
+def _by_axis(corners: Float[ndarray, "b 3 c"]) -> Float[ndarray, "a c"]:
+    """Rows along the first axis of all corners first."""
+    return corners.transpose(1, 0, 2).reshape(-1, corners.shape[2])
 
 
 def _orthonormal(columns: Float[ndarray, "m n 6"]) -> Float[ndarray, "m n 6"]:

@@ -18,7 +18,7 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.free import FreeLens
 
-__all__ = ["by_corner", "residual_slopes", "spline_values"]
+__all__ = ["by_corner", "residual_slopes", "splines_along"]
 
 # A corner has so many coordinates.
 SPACE = 3
@@ -57,11 +57,9 @@ def residual_slopes(
             turned = by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows])  # (v, p, 3, 2)
             of_corner[chunk.rows] = turned.transpose(0, 1, 3, 2)
         if isinstance(camera.lens, FreeLens):
-            lattice, places = camera.lens.over.lattice, _places(camera.lens, poses.only(chunk.rows), points)
-            of_spline.across[chunk.rows] = lattice.along(places[0], 0)[0]
-            of_spline.down[chunk.rows] = (
-                lattice.along(places[1], 1)[0] * observations.present[chunk.rows, :, None]
-            )
+            across, down = splines_along(camera.lens, poses.only(chunk.rows), points)
+            of_spline.across[chunk.rows] = across
+            of_spline.down[chunk.rows] = down * observations.present[chunk.rows, :, None]
     frame = camera.lens_frame or camera.intrinsics
     surface = np.zeros((p, 0))
     return ResidualSlopes(of_camera, of_pose, of_spline, of_corner, surface, frame.matrix[:2, :2]), residual
@@ -76,15 +74,13 @@ def by_corner(
     return np.ascontiguousarray(turned.transpose(0, 3, 1, 2))
 
 
-def spline_values(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> Float[ndarray, "v p g"]:
-    """The value of every spline at every corner's place in the base's distorted plane."""
-    return lens.over.lattice.design(*_places(lens, poses, points))
-
-
-def _places(lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]) -> tuple[ndarray, ndarray]:
-    """x and y (v,p) of every corner in the base's distorted plane."""
+def splines_along(
+    lens: FreeLens, poses: Poses, points: Float[ndarray, "p 3"]
+) -> tuple[Float[ndarray, "v p nx"], Float[ndarray, "v p ny"]]:
+    """The values of the splines across and down at every corner's place in the base's distorted plane."""
     in_camera = np.einsum("vab,pb->avp", poses.rotation, points) + poses.translation.T[:, :, None]
-    return lens.base.warp(*lens.chart.flatten(*in_camera))
+    x, y = lens.base.warp(*lens.chart.flatten(*in_camera))
+    return lens.over.lattice.along(x, 0), lens.over.lattice.along(y, 1)
 
 
 def _room_for_splines(camera: Camera, views: int, corners: int) -> SplineValues:

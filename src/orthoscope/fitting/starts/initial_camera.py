@@ -9,7 +9,7 @@ lens is of another kind, and then turned into it (lens_fit).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -110,26 +110,26 @@ class StartingCameras:
             image_size,
             narrowing,
         )
+        self._refined: dict[Camera, Camera] = {}
 
     @cached_property
     def pinhole(self) -> Estimate | None:
         """Zhang's closed form as a camera without distortion; where the full form fails, with the principal
         point at the centre.
         """
-        basis = self.narrowing.basis
-        for allowed in (
-            basis,
-            *(narrower for narrower in (NO_SKEW, CENTRED_SQUARE) if len(narrower) < len(basis)),
-        ):
-            K = intrinsics_of_homographies(self._homographies, self.image_size, allowed)
-            if K is not None and _plausible(K, self.image_size):
-                return self._pinhole_with(K)
+        if self._closed_form is not None and _plausible(self._closed_form, self.image_size):
+            return self._pinhole_with(self._closed_form)
+        for allowed in (NO_SKEW, CENTRED_SQUARE):
+            if len(allowed) < len(self.narrowing.basis):
+                K = intrinsics_of_homographies(self._homographies, self.image_size, allowed)
+                if K is not None and _plausible(K, self.image_size):
+                    return self._pinhole_with(K)
         return None
 
     @cached_property
     def closed_form_is_off_the_frame(self) -> bool:
         """Whether Zhang's closed form puts the principal point beyond the frame, a camera else."""
-        K = intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)
+        K = self._closed_form
         return (
             K is not None
             and _plausible(K, self.image_size, FARTHEST_AWAY)
@@ -144,7 +144,7 @@ class StartingCameras:
         """
         if "cx" not in self.narrowing.free:
             return []
-        found = [intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)]
+        found = [self._closed_form]
         width, height = self.image_size
         for x, y in PLACES_AROUND:
             away = np.array([[1.0, 0.0, -x * width], [0.0, 1.0, -y * height], [0.0, 0.0, 1.0]])
@@ -156,6 +156,11 @@ class StartingCameras:
             if K is not None and _plausible(K, self.image_size, FARTHEST_AWAY)
         ]
         return sorted(starts, key=self.misfit)[:MOST_STARTS]
+
+    @cached_property
+    def _closed_form(self) -> Intrinsics | None:
+        """Zhang's."""
+        return intrinsics_of_homographies(self._homographies, self.image_size, self.narrowing.basis)
 
     @cached_property
     def _homographies(self) -> Float[ndarray, "m 3 3"]:
@@ -204,6 +209,11 @@ class StartingCameras:
         """A base camera with its own lens's first coefficients fitted, robustly, in a few steps, to some of
         the views.
         """
+        if base.camera not in self._refined:
+            self._refined[base.camera] = self._refine(base)
+        return self._refined[base.camera]
+
+    def _refine(self, base: Estimate) -> Camera:
         rows = self.observations.evenly(SAMPLE_VIEWS)
         camera, some = base.camera, self.observations.only(rows)
         problem = Reprojection(some, self.points, camera, (*self.narrowing.free, *camera.lens.free[:2]))
@@ -225,8 +235,9 @@ class StartingCameras:
 
 def starts(
     bases: StartingCameras, lens: type[Formula], *, coefficients: Sequence[str] | None = None
-) -> list[Estimate]:
-    """Where to start from to get a camera with the wanted lens, the likelier first.
+) -> Iterator[Estimate]:
+    """Where to start from to get a camera with the wanted lens, the likelier first, each made when it is
+    asked for.
 
     Args:
         coefficients: those that will move, by default what the lens frees; the others have their usual
@@ -235,22 +246,25 @@ def starts(
         CalibrationError: the corners fit no camera, or lie where the wanted lens cannot see.
     """
     coefficients = lens.free if coefficients is None else coefficients
-    if lens.chart is GNOMONIC and bases.pinhole is not None and bases.pinhole_fits:
-        return _with_lens(bases, bases.pinhole, lens, coefficients)
-    found: list[Estimate] = []
+    if bases.pinhole is not None and bases.pinhole_fits:
+        yield from _with_lens(bases, bases.pinhole, lens, coefficients)
+        return
+    found = False
     for base in sorted((base for base in (bases.angle, bases.pinhole) if base is not None), key=bases.misfit):
         try:
-            found += _with_lens(bases, base, lens, coefficients)
+            with_lens = _with_lens(bases, base, lens, coefficients)
         except CalibrationError:
             if not found:  # the likeliest base says that the lens cannot see these corners
                 raise
+            continue
+        yield from with_lens
+        found = True
     if not found:
         raise CalibrationError(
             "the corners fit no camera at all: neither a pin-hole nor a fisheye sees them as images of a flat"
             " target. Check that the target's columns and rows are right and that the corners are listed in"
             " order."
         )
-    return found
 
 
 def starts_elsewhere(

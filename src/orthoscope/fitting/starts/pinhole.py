@@ -27,7 +27,7 @@ def pinhole_start(bases: StartingCameras) -> Estimate:
     """
     if bases.pinhole is not None:
         return bases.pinhole
-    return bases.posed(replace(starts(bases, Brown)[0].camera, lens=Brown()))
+    return bases.posed(replace(next(starts(bases, Brown)).camera, lens=Brown()))
 
 
 def fit_pinhole(

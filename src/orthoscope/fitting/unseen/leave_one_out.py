@@ -28,7 +28,7 @@ from orthoscope.fitting.slopes.linearised import Linearised
 from orthoscope.fitting.unseen.near_copies import summed_over
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
-__all__ = ["LeaveOneOut", "hat_of", "leave_one_out", "scattered"]
+__all__ = ["LeaveOneOut", "leave_one_out", "say_of", "scattered"]
 
 # Conjugate gradients end at this share of a view's residual.
 TOLERANCE_SHARE = 1e-5
@@ -103,16 +103,19 @@ def scattered(changes: Float[ndarray, "m d"], groups: Int[ndarray, " m"]) -> Flo
     return np.sqrt((m - 1.0) / m * share)[:, None] * (changes - mean)
 
 
-def hat_of(fit: Linearised, rows: Float[ndarray, "m n c"]) -> Float[ndarray, "m n c"]:
-    """B_j times rows of each view: the part of the view's residual that its own say in the fit explains."""
-    if fit.views <= VIEWS_AT_ONCE:
-        return fit.moves(fit.solved(fit.pulls(rows)))
-    found = np.empty_like(rows)
+def say_of(
+    fit: Linearised, rows: Float[ndarray, "m n c"]
+) -> tuple[Float[ndarray, "m c c"], Float[ndarray, "m d c"]]:
+    """What each view's own say in the fit explains of rows of it, rows_j'B_j rows_j; and how the camera moves
+    by them, its part of H^-1 A_j' rows_j.
+    """
+    d, c = fit.of_camera, rows.shape[2]
+    explained, moved = np.empty((fit.views, c, c)), np.empty((fit.views, d, c))
     for start in range(0, fit.views, VIEWS_AT_ONCE):
         some = slice(start, start + VIEWS_AT_ONCE)
-        part = fit.only(some)
-        found[some] = part.moves(part.solved(part.pulls(rows[some])))
-    return found
+        explained[some], found = fit.inverse.between(fit.only(some).pulls(rows[some]))
+        moved[some] = found[:, :d]
+    return explained, moved
 
 
 def _without_themselves(

@@ -26,16 +26,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from orthoscope.fitting.slopes.linearised import Linearised
-from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, hat_of
+from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, say_of
 from orthoscope.geometry.arrays import Float, evenly, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.target_shape import polynomials
 
-__all__ = ["ORDERS", "STRETCH_SHARE", "Scatter", "likenesses", "patterns_over_views", "scatter_of"]
+__all__ = [
+    "ORDERS",
+    "STRETCH_SHARE",
+    "Likeness",
+    "Scatter",
+    "likenesses",
+    "patterns_over_views",
+    "scatter_of",
+]
 
 # Patterns over a board have these orders: a pose takes those below, and of those above errors are as good as
 # independent.
@@ -61,7 +70,8 @@ class Scatter:
         camera: where its fit ended.
         names: of its k parameters that moved; the displacement's coefficients, along x and then along y, come
             after them.
-        model, alike, prior, stretch: (d,d) covariances.
+        model, alike, prior: (d,d) covariances.
+        stretch: (2,d) rows whose products sum to what is called so above.
         left_out: (m,d) rows whose products sum to the jackknife's covariance; NaN for views that the others
             cannot tell.
     """
@@ -72,7 +82,7 @@ class Scatter:
     alike: Float[ndarray, "d d"]
     prior: Float[ndarray, "d d"]
     left_out: Float[ndarray, "m d"]
-    stretch: Float[ndarray, "d d"]
+    stretch: Float[ndarray, "s d"]
 
     @cached_property
     def jackknife(self) -> Float[ndarray, "d d"]:
@@ -83,7 +93,7 @@ class Scatter:
     @property
     def repeated(self) -> Float[ndarray, "d d"]:
         """What independent errors of corners make alone."""
-        return self.model - (self.prior - self.stretch)
+        return self.model - (self.prior - self.stretch.T @ self.stretch)
 
     @property
     def parameters(self) -> Float[ndarray, "k k"]:
@@ -96,6 +106,18 @@ class Scatter:
         return model * larger * larger[:, None]
 
 
+class Likeness(NamedTuple):
+    """Of patterns of one order.
+
+    Attributes:
+        tau: 1 or more, how much larger they are in the residuals than independent errors would make them.
+        moved: (m,d,c) how the camera moves by each of them, as errors of a view.
+    """
+
+    tau: float
+    moved: Float[ndarray, "m d c"]
+
+
 def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p 3"]) -> Scatter:
     """The scatter of a camera that was fitted together with poses and shape.
 
@@ -103,29 +125,27 @@ def scatter_of(fit: Linearised, left_out: LeaveOneOut, points: Float[ndarray, "p
         points: the target's corners, nominal.
     """
     some = fit.only(evenly(fit.views, VIEW_COUNT))
-    patterns = patterns_over_views(some, points)
-    tau = likenesses(some, patterns)
     camera = np.zeros((fit.of_camera, fit.of_camera))
-    for rows, larger in zip(patterns, tau, strict=True):
-        if larger > 1.0:
-            by_camera = fit.camera_columns.T @ some.pulls(rows).transpose(1, 0, 2).reshape(fit.unknowns, -1)
-            camera += (larger - 1.0) * by_camera @ by_camera.T
+    for larger, moved in likenesses(some, patterns_over_views(some, points)):
+        by_camera = moved.transpose(1, 0, 2).reshape(fit.of_camera, -1)
+        camera += (larger - 1.0) * by_camera @ by_camera.T
     stretch = _by_stretch(fit, points)
-    alike = fit.camera_covariance + fit.noise * fit.views / some.views * camera + stretch
-    prior = fit.prior_covariance + stretch
+    hidden = stretch.T @ stretch
+    alike = fit.camera_covariance + fit.noise * fit.views / some.views * camera + hidden
+    prior = fit.prior_covariance + hidden
     return Scatter(fit.camera, fit.names, fit.camera_covariance, alike, prior, left_out.scatter, stretch)
 
 
-def _by_stretch(fit: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray, "d d"]:
-    """What is added to the camera's covariance where the shape's prior is no surer of stretch and shear than
-    STRETCH_SHARE; nothing where views show them, or where the prior is no surer.
+def _by_stretch(fit: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray, "2 d"]:
+    """Rows whose products are added to the camera's covariance where the shape's prior is no surer of stretch
+    and shear than STRETCH_SHARE; nothing where views show them, or where the prior is no surer.
 
     W'x is how much of each mode there is, P what the prior knows of them, D what the views know, so that
     (W'H^-1 W)^-1 = D + P.  P - E in the place of P adds H^-1 W (E + E (D + P - E)^-1 E) W'H^-1.
     """
     r, surface = fit.slopes.sizes[2], fit.slopes.surface
     if not r or fit.noise <= 0.0:
-        return np.zeros((fit.of_camera, fit.of_camera))
+        return np.zeros((2, fit.of_camera))
     seen = np.any(surface != 0.0, axis=1)
     (x, y), zero = ((points[:, :2] - points[seen, :2].mean(0)) * seen[:, None]).T, np.zeros(len(points))
     precision, W, known = fit.shape_precision[: 3 * r], np.zeros((fit.unknowns, 2)), np.zeros(2)
@@ -138,8 +158,8 @@ def _by_stretch(fit: Linearised, points: Float[ndarray, "p 3"]) -> Float[ndarray
     by_views, vectors = np.linalg.eigh(np.linalg.inv(W.T @ solved) - np.diag(known))
     data = (vectors * np.maximum(by_views, 0.0)) @ vectors.T  # rounding may leave less than nothing
     added = excess + excess @ np.linalg.solve(data + np.diag(known) - excess, excess)
-    camera = solved[: fit.of_camera]
-    return fit.noise * camera @ (0.5 * (added + added.T)) @ camera.T
+    sizes, vectors = np.linalg.eigh(0.5 * fit.noise * (added + added.T))
+    return np.sqrt(np.maximum(sizes, 0.0))[:, None] * (solved[: fit.of_camera] @ vectors).T
 
 
 def patterns_over_views(
@@ -168,13 +188,14 @@ def patterns_over_views(
     return np.split(basis, np.cumsum(sizes)[:-1], axis=2)
 
 
-def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "_ _ _"]]) -> tuple[float, ...]:
-    """tau_o, 1 or more: how much larger each order's patterns are in the residuals than independent errors
-    would make them.
-    """
+def likenesses(fit: Linearised, patterns: Sequence[Float[ndarray, "_ _ _"]]) -> list[Likeness]:
+    """Of each order's patterns, as `patterns_over_views` has them."""
+    explained, moved = say_of(fit, np.concatenate(patterns, axis=2))
+    own = np.diagonal(explained, axis1=1, axis2=2)
+    ends = np.cumsum([rows.shape[2] for rows in patterns])[:-1]
     found = []
-    for rows in patterns:
+    for rows, share, by_rows in zip(patterns, np.split(own, ends, 1), np.split(moved, ends, 2), strict=True):
         in_residuals = ((fit.errors[:, None] @ rows) ** 2).sum()
-        by_chance = fit.noise * float((rows**2).sum() - (rows * hat_of(fit, rows)).sum())
-        found.append(max(1.0, float(in_residuals) / max(by_chance, 1e-300)))
-    return tuple(found)
+        by_chance = fit.noise * float((rows**2).sum() - share.sum())
+        found.append(Likeness(max(1.0, float(in_residuals) / max(by_chance, 1e-300)), by_rows))
+    return found

@@ -1,13 +1,16 @@
 """What `evaluation.json` holds: every number and sentence of an Evaluation, and the camera that was judged.
 
 The calibration itself stands in its own file; the camera is told again so that the two can be seen to belong
-together, and so that a program that reads this file alone knows what was judged. Held-out residuals are a row
-[x, y] for each corner, in the order of the calibration's views and their corners; folds is in how many parts
-the views were held out, 0 for each in its turn, and five where an earlier file does not say.
+together, and so that a program that reads this file alone knows what was judged. Deviations are the standard
+deviations of the camera's parameters that were estimated, by their names; null where one is open. Held-out
+residuals are a row [x, y] for each corner, in the order of the calibration's views and their corners; folds
+is in how many parts the views were held out, 0 for each in its turn, and five where an earlier file does not
+say.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 import msgspec
@@ -212,6 +215,7 @@ class EvaluationFile(FileStruct, kw_only=True):
     suspects: list[tuple[str, str]] = []
     views: list[ViewErrorFile]
     camera: CameraFile
+    deviations: dict[str, Number] = {}
     target_misfit: TargetMisfitFile
     lens_misfit: LensMisfitFile
     held_out_residuals: list[list[list[Number]]]
@@ -222,6 +226,10 @@ class EvaluationFile(FileStruct, kw_only=True):
         return cls(
             version=evaluation.calibration.version,
             camera=CameraFile.of(evaluation.calibration.camera),
+            deviations={
+                name: deviation if math.isfinite(deviation) else None
+                for name, deviation in evaluation.calibration.uncertainty.deviations.items()
+            },
             views=[ViewErrorFile.of(view) for view in evaluation.views],
             target_misfit=TargetMisfitFile.of(evaluation.misfit.target),
             lens_misfit=LensMisfitFile.of(evaluation.misfit.lens),

@@ -9,7 +9,6 @@ numbers are very small or very large.
 from __future__ import annotations
 
 import json
-import re
 from typing import Any
 
 import msgspec
@@ -18,8 +17,6 @@ __all__ = ["lay_out"]
 
 # An object of plain values that fits in so many characters stays on one line.
 LINE_WIDTH = 120
-# In msgspec's text: numbers that Python writes in another way, NaN, what is no number.
-OTHERWISE = re.compile(r'e|0\.0000|[n"{]')
 
 
 def lay_out(value: Any, indent: str = "") -> str:
@@ -67,13 +64,18 @@ def _table(value: Any) -> str:
     it.
     """
     text = msgspec.json.encode(value).decode()
-    if OTHERWISE.search(text):
+    if _has_others(text):
         rows = text[2:-2].split("],[")
         plain = '"' not in text and "{" not in text and not text.startswith("[[[") and text.endswith("]]")
         if not plain or len(rows) != len(value):
             return _line(value)
         for i, row in enumerate(rows):
-            if OTHERWISE.search(row):
+            if _has_others(row):
                 rows[i] = _line(value[i])[1:-1].replace(", ", ",")
         text = f"[[{'],['.join(rows)}]]"
     return text.replace(",", ", ")
+
+
+def _has_others(text: str) -> bool:
+    """Whether msgspec's text has numbers that Python writes in another way, null, or what is no number."""
+    return "e" in text or "0.0000" in text or "n" in text or '"' in text or "{" in text

@@ -26,6 +26,7 @@ from orthoscope.methods.decoupled.step_one_linearised import linearised
 from orthoscope.methods.decoupled.step_two import formula_from_pairs
 from orthoscope.methods.decoupled.step_two_linearised import PairsLeftOut
 from orthoscope.models.camera import Camera
+from orthoscope.solve.least_squares import Status
 from orthoscope.targets.detections import Detections
 
 __all__ = ["JOINT", "PAIRS", "Candidates", "Model"]
@@ -66,6 +67,13 @@ class Candidates:
         except CalibrationError:
             squares = np.full(len(self.detections.views), np.nan)
         return Contender(model.base, model.shape, model.lens, model.fit, squares)
+
+    def has_arrived(self, model: Model) -> bool:
+        """Whether the model's fit ended at a minimum."""
+        try:
+            return self.step_one(model.step_one).status == Status.CONVERGED
+        except CalibrationError:
+            return False
 
     def _residuals(self, model: Model) -> Float[ndarray, "m n"]:
         """Of each view by the model without it, as in `LeaveOneOut`.

@@ -16,7 +16,7 @@ docs/measured/choice.md.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import product
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -113,7 +113,7 @@ def decoupled(
         assumptions = (TOO_FEW,) if max(map(len, left)) > 1 else ()
     else:
         model, told = _chosen(candidates, left, judging)
-    candidates = Candidates(used, skew=skew, fitter=Kept(used, skew=skew, flats=flats, cold=fitter.cold))
+    candidates = Candidates(used, skew=skew, fitter=Kept(used, skew=skew, flats=flats, compared=fitter))
     flat = candidates.flat(model.base)
     settings = {
         "lens": model.lens,
@@ -174,15 +174,15 @@ def _assumed(left: _Open, start: Calibration) -> Model:
 def _chosen(
     candidates: Candidates, left: _Open, progress: Progress | None
 ) -> tuple[Model, tuple[Candidate, ...]]:
-    """The base by the richest model on it; then the target's shape and the lens of step 1; then the formula.
+    """The base by the richest model on it; then that or the simplest; then the formula.
 
     Raises:
         CalibrationError: no base can be fitted.
     """
     corners = np.array([len(view.ids) for view in candidates.detections.views], dtype=float)
     tried: dict[Model, Contender] = {}
-    of_base = [Model(base, left.shapes[-1], left.first_lens[-1]) for base in left.bases]
-    to_do = len(of_base) + len(left.shapes) * len(left.first_lens) - 1 + 2 * len(left.formulas)
+    of_base = [_ends(base, left)[-1] for base in left.bases]
+    to_do = len(of_base) + len(_ends(left.bases[0], left)) - 1 + 2 * len(left.formulas)
 
     def judge(models: Sequence[Model]) -> list[Contender]:
         for model in models:
@@ -194,10 +194,12 @@ def _chosen(
 
     if len(of_base) > 1:
         fitting = [model for model in of_base if _can_be_fitted(candidates, model.base)] or of_base[:1]
-        base = fitting[first_as_good(judge(fitting), corners)].base
+        arrived = _arrived(judge(fitting), candidates, fitting)
+        tried |= zip(fitting, arrived, strict=True)
+        base = fitting[first_as_good(arrived, corners)].base
     else:
         base = left.bases[0]
-    models = [Model(base, shape, first_lens) for shape, first_lens in product(left.shapes, left.first_lens)]
+    models = _ends(base, left)
     model = models[richest_unless_worse(judge(models), corners)] if len(models) > 1 else models[0]
     if left.formulas:
         models = _with_formulas(model, left)
@@ -207,6 +209,28 @@ def _chosen(
     listed = list(tried)
     told = judged(list(tried.values()), corners, listed.index(model)) if model in tried else ()
     return model, told
+
+
+def _arrived(
+    contenders: Sequence[Contender], candidates: Candidates, models: Sequence[Model]
+) -> list[Contender]:
+    """The contenders; what is foreseen by a fit that was stopped on its way counts for nothing beside those
+    that have arrived: with other roundings it would be elsewhere.
+    """
+    arrived = [candidates.has_arrived(model) for model in models]
+    nothing = np.full_like(contenders[0].squares, np.nan)
+    return [
+        contender if there or not any(arrived) else replace(contender, squares=nothing)
+        for contender, there in zip(contenders, arrived, strict=True)
+    ]
+
+
+def _ends(base: str, left: _Open) -> list[Model]:
+    """The simplest model on a base and the richest, which holds all that are between: where less is enough,
+    its weights, which are found, make it nearly that; one where nothing is left open.
+    """
+    ends = (Model(base, left.shapes[i], left.first_lens[i]) for i in (0, -1))
+    return list(dict.fromkeys(ends))
 
 
 def _can_be_fitted(candidates: Candidates, base: str) -> bool:

@@ -24,10 +24,10 @@ import numpy as np
 
 from orthoscope.fitting.calibration import Variances
 from orthoscope.fitting.reprojection import POSE
-from orthoscope.geometry.arrays import CalibrationError
+from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.methods.decoupled.normal_equations import SPACE, spline_unknowns
 from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known, Precisions
-from orthoscope.models.target_shape import polynomials
+from orthoscope.solve.losses import Loss
 
 __all__ = ["Evidence", "first_guess"]
 
@@ -46,10 +46,6 @@ LEAST_BEND = 1e-8
 MOST_BEND = 0.1
 # Noise and parameters may still change by this share.
 SETTLED_SHARE = 0.01
-# The patterns have these orders: a pose takes those below, and waves are single corners' matter.
-SMOOTH_ORDERS = (2, 3, 4)
-# The squares that are left may be less than nothing by this share of the cost, by rounding.
-ROUNDING_SHARE = 1e-9
 # Without noise the squares that are left count as so much, px^2.
 LEAST_SQUARES = 1e-24
 PLANE, HEIGHT = slice(None, 2), slice(2, None)
@@ -84,12 +80,10 @@ class Evidence:
         """As a calibration kept it."""
         return cls(*variances)
 
-    def with_shape_of(self, other: Evidence) -> Evidence:
-        """With the variances of the target's shape that another fit found, but none so small that it could
-        not grow.
-        """
+    def awake(self) -> Evidence:
+        """With no variance of the target's shape so small that it could not grow."""
         least = (AWAKE_SHARE * GUESS_SHARE * self.size) ** 2
-        surface, singles = np.maximum(other.surface, least), np.maximum(other.singles, least)
+        surface, singles = np.maximum(self.surface, least), np.maximum(self.singles, least)
         return replace(
             self,
             surface=(float(surface[0]), float(surface[1])),
@@ -103,33 +97,39 @@ class Evidence:
         surface = np.broadcast_to(smooth / np.array([plane, plane, height]), (coefficients, SPACE))
         return Precisions(surface, self.noise / np.array(self.singles), smooth / self.bend)
 
-    def renewed(self, problem: Joint, unknowns: DecoupledEstimate, cost: float, known: Known) -> Evidence:
-        """The variances that an estimate, its cost and what the data determined of it speak for.
+    def renewed(
+        self, problem: Joint, unknowns: DecoupledEstimate, *, known: Known, loss: Loss, residuals: ndarray
+    ) -> Evidence:
+        """The variances that an estimate and what the data determined of it speak for.
 
+        Args:
+            loss: how errors count.
+            residuals: of the problem at the estimate.
         Raises:
             CalibrationError: the estimate leaves errors that are no number.
         """
         observations = problem.measurements.observations
-        bend_cost, surface_cost, single_cost = problem.penalties(unknowns)
+        bend_cost, _, _ = problem.penalties(unknowns)
         determined = len(problem.free) + known.spline + float(known.surface.sum() + known.singles.sum())
         freedom = 2 * observations.corners - POSE * len(observations.order) - determined
-        left = cost - bend_cost - surface_cost - single_cost
-        if not left > -ROUNDING_SHARE * cost:  # not a number too: nothing was fitted
+        left = float(loss.cost((residuals**2).sum(2)).sum())
+        if not left < np.inf:  # not a number too: nothing was fitted
             raise CalibrationError("the photographs leave this model so open that its errors are no number.")
         noise = max(left, LEAST_SQUARES) / max(freedom, 1.0)
         low, high = (LEAST_SHARE * self.size) ** 2, (MOST_SHARE * self.size) ** 2
         surface = [
-            _variance(unknowns.surface[:, part], known.surface[:, part], low, high)
+            _variance(unknowns.surface[:, part], float(known.surface[:, part].sum()), low, high)
             for part in (PLANE, HEIGHT)
         ]
         singles = [
-            _variance(unknowns.singles[:, axis], known.singles[:, axis], low, high) for axis in range(SPACE)
+            _variance(unknowns.singles[:, axis], float(known.singles[axis]), low, high)
+            for axis in range(SPACE)
         ]
         bend = self.bend
         if spline_unknowns(unknowns.camera):
             squares = bend_cost / problem.precisions.spline
             bend = float(np.clip(squares / max(known.spline, 1e-9), LEAST_BEND**2, MOST_BEND**2))
-        likeness = _likeness(problem, unknowns, noise)
+        likeness = _likeness(problem, residuals, noise)
         return replace(
             self,
             likeness=likeness,
@@ -156,18 +156,16 @@ def first_guess(noise: float, size: float, focal: float) -> Evidence:
     return Evidence(noise, (corner, corner), (corner, corner, corner), (0.1 / focal) ** 2, size)
 
 
-def _likeness(problem: Joint, unknowns: DecoupledEstimate, noise: float) -> float:
+def _likeness(problem: Joint, residuals: Float[ndarray, "m p 2"], noise: float) -> float:
     """Mean square of smooth patterns in the residuals of a view, over what independent errors of this
     variance would give.
     """
-    seen = problem.measurements.observations.present
-    patterns = polynomials(problem.points, seen.max(0) > 0, orders=SMOOTH_ORDERS, parts=problem.parts)
-    found = np.einsum("pr,mpa->mra", patterns, problem.residuals(unknowns))
+    seen, patterns = problem.measurements.observations.present, problem.smooth_patterns
+    found = np.tensordot(residuals, patterns, axes=(1, 0))
     expected = noise * (seen @ patterns**2)
     return max(1.0, float((found**2).sum() / (2.0 * expected.sum())))
 
 
-def _variance(values: np.ndarray, known: np.ndarray, low: float, high: float) -> float:
-    return (
-        float(np.clip((values**2).sum() / max(float(known.sum()), 1e-9), low, high)) if values.size else low
-    )
+def _variance(values: np.ndarray, known: float, low: float, high: float) -> float:
+    """known: how many of the values the data determined."""
+    return float(np.clip((values**2).sum() / max(known, 1e-9), low, high)) if values.size else low

@@ -68,7 +68,8 @@ def _richest(calibration: Calibration, candidates: Candidates, own: OwnFit | Non
     except (CalibrationError, np.linalg.LinAlgError):
         return None
     poorer = own.scatter if own and own.scatter is not scatter else None
-    return RichestFit(candidates.detections, model.base, known, left_out, scatter, poorer)
+    flat = candidates.flat(model.base)
+    return RichestFit(candidates.detections, model.base, flat, known, left_out, scatter, poorer)
 
 
 def _richest_model(calibration: Calibration) -> Model:

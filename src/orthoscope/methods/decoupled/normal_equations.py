@@ -10,7 +10,7 @@ group is eliminated later:
 
 A corner moves its image as its view's translation does, turned into the target's frame: d/dp = R^T d/dt. A
 spline's coefficient moves u by f_x B and v by f_y B, so its sums are products with the one matrix B of spline
-values.
+values (spline_sums.py).
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ import numpy as np
 
 from orthoscope.fitting.observations import Chunk, Observations, Poses
 from orthoscope.fitting.reprojection import POSE, Estimate, Places, Reprojection
-from orthoscope.fitting.slopes.residual_slopes import by_corner, spline_values
+from orthoscope.fitting.slopes.residual_slopes import splines_along
 from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.methods.decoupled.spline_sums import SplineSums, spline_sums
 from orthoscope.models.camera import Camera
 from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.models.lenses.free import FreeLens
-from orthoscope.solve.losses import Linear, Loss
+from orthoscope.solve.losses import Loss
 
 __all__ = ["MeasurementSums", "Measurements", "spline_unknowns"]
 
@@ -112,19 +113,13 @@ class Measurements:
                 part, root = self._weigh(stacked, chunk, loss)
                 cost += part
                 _add_camera_and_poses(sums, stacked, chunk.rows, k)
-                turned = (
-                    by_corner(stacked[:, k + SPACE : k + POSE], poses.rotation[chunk.rows])
-                    if self.corners_move
-                    else None
-                )
+                turned = _turned(stacked, poses.rotation[chunk.rows], k) if self.corners_move else None
                 if turned is not None:
                     _add_corners(sums, stacked, turned, chunk.rows, k)
                 if isinstance(camera.lens, FreeLens):
-                    design = spline_values(camera.lens, poses.only(chunk.rows), points) * root[:, :, None]
-                    frame = camera.lens_frame or camera.intrinsics
-                    _add_spline(sums, design, stacked, chunk.rows, k, frame)
-                    if turned is not None:
-                        _add_spline_and_corners(sums, design, turned, k, frame)
+                    across, down = splines_along(camera.lens, poses.only(chunk.rows), points)
+                    found = spline_sums(across * root[:, :, None], down, stacked, turned)
+                    _add_spline(sums, found, chunk.rows, k, camera.lens_frame or camera.intrinsics)
         return sums._replace(cost=cost)
 
     def forget(self) -> None:
@@ -135,7 +130,11 @@ class Measurements:
         self, camera: Camera, poses: Poses, points: Float[ndarray, "p 3"]
     ) -> Float[ndarray, "m p 2"]:
         """Projected minus detected, pixels; 0 where a corner was not seen."""
-        return self.sums(camera, poses, points, self._last[0][2] if self._last else Linear()).residuals
+        seen = self.observations.present > 0
+        in_camera = points @ poses.rotation.transpose(0, 2, 1) + poses.translation[:, None]
+        found = np.zeros((*seen.shape, 2))
+        found[seen] = camera.project(in_camera[seen], beyond=True) - self.observations.pixels()[seen]
+        return found
 
     def _weigh(self, stacked: ndarray, chunk: Chunk, loss: Loss) -> tuple[float, ndarray]:
         """The cost of a chunk, and the root of each corner's weight (views, n), by which its rows are
@@ -178,48 +177,38 @@ def _add_camera_and_poses(sums: MeasurementSums, stacked: ndarray, rows: slice, 
     sums.zv[rows, :k], sums.vv[rows], sums.v[rows] = gram[:, :k, k:-1], gram[:, k:-1, k:-1], gram[:, k:-1, -1]
 
 
-def _add_corners(sums: MeasurementSums, stacked: ndarray, turned: ndarray, rows: slice, k: int) -> None:
-    views, columns, _ = stacked.shape
-    of_corner = stacked.reshape(views, columns, 2, -1).transpose(0, 3, 2, 1)  # (views, n, 2, columns)
-    products = turned @ of_corner
-    sums.zc[:, :k] += products[..., :k].sum(0).transpose(0, 2, 1)
-    sums.cc[:] += (turned @ turned.transpose(0, 1, 3, 2)).sum(0)
-    sums.c[:] += products[..., -1].sum(0)
-    sums.vc[rows] = products[..., k:-1].transpose(0, 1, 3, 2)
+def _turned(stacked: ndarray, rotation: ndarray, k: int) -> Float[ndarray, "v 3 2 p"]:
+    """d(u, v) by the place of each corner in the target's frame."""
+    by_place = rotation.transpose(0, 2, 1) @ stacked[:, k + SPACE : k + POSE]
+    return by_place.reshape(len(stacked), SPACE, 2, -1)
 
 
-def _add_spline(
-    sums: MeasurementSums, design: ndarray, stacked: ndarray, rows: slice, k: int, frame: Intrinsics
+def _add_corners(
+    sums: MeasurementSums, stacked: ndarray, turned: Float[ndarray, "v 3 2 p"], rows: slice, k: int
 ) -> None:
-    """Sums of the displacement's coefficients with themselves, camera and poses: x moves u by fx B; y moves v
-    by fy B and u by skew B.
-    """
-    corners, g = design.shape[1:]
+    halves = stacked.reshape(*stacked.shape[:2], 2, -1)
+    sums.zc[:, :k] += np.einsum("vahp,vchp->acp", turned, halves[:, :k]).transpose(2, 1, 0)
+    sums.cc[:] += np.einsum("vahp,vbhp->abp", turned, turned).transpose(2, 0, 1)
+    sums.c[:] += np.einsum("vahp,vhp->ap", turned, halves[:, -1]).T
+    sums.vc[rows] = np.einsum("vahp,vchp->vacp", turned, halves[:, k:-1]).transpose(0, 3, 2, 1)
+
+
+def _add_spline(sums: MeasurementSums, found: SplineSums, rows: slice, k: int, frame: Intrinsics) -> None:
+    """Sums of the displacement's coefficients: x moves u by fx B; y moves v by fy B and u by skew B."""
+    g = len(found.square)
     x, y = slice(k, k + g), slice(k + g, k + 2 * g)
-    flat = design.reshape(-1, g)
-    square = flat.T @ flat
-    sums.zz[x, x] += frame.fx**2 * square
-    sums.zz[x, y] += frame.fx * frame.skew * square
-    sums.zz[y, x] += frame.fx * frame.skew * square
-    sums.zz[y, y] += (frame.fy**2 + frame.skew**2) * square
-    across = design.transpose(0, 2, 1)
-    of_u, of_v = (
-        across @ stacked[:, :, half].transpose(0, 2, 1)
-        for half in (slice(None, corners), slice(corners, None))
-    )
-    for columns, products in ((x, frame.fx * of_u), (y, frame.fy * of_v + frame.skew * of_u)):
+    sums.zz[x, x] += frame.fx**2 * found.square
+    sums.zz[x, y] += frame.fx * frame.skew * found.square
+    sums.zz[y, x] += frame.fx * frame.skew * found.square
+    sums.zz[y, y] += (frame.fy**2 + frame.skew**2) * found.square
+    of_y = frame.fy * found.of_v + frame.skew * found.of_u
+    for columns, products in ((x, frame.fx * found.of_u), (y, of_y)):
         with_camera = products[:, :, :k].sum(0)
         sums.zz[columns, :k] += with_camera
         sums.zz[:k, columns] += with_camera.T
         sums.z[columns] += products[:, :, -1].sum(0)
         sums.zv[rows, columns] = products[:, :, k:-1]
-
-
-def _add_spline_and_corners(
-    sums: MeasurementSums, design: ndarray, turned: ndarray, k: int, frame: Intrinsics
-) -> None:
-    g = design.shape[2]
-    down = design.transpose(1, 2, 0)
-    by_u, by_v = (down @ turned[..., half].transpose(1, 0, 2) for half in (0, 1))
-    sums.zc[:, k : k + g] += frame.fx * by_u
-    sums.zc[:, k + g : k + 2 * g] += frame.fy * by_v + frame.skew * by_u
+    if len(found.by_place):
+        by_u, by_v = found.by_place
+        sums.zc[:, x] += frame.fx * by_u.transpose(2, 0, 1)
+        sums.zc[:, y] += (frame.fy * by_v + frame.skew * by_u).transpose(2, 0, 1)

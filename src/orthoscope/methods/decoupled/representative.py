@@ -8,6 +8,8 @@ tell most about a camera, are among them, whatever the order of the photographs.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from orthoscope.geometry.arrays import Float, ndarray
@@ -16,8 +18,10 @@ from orthoscope.targets.detections import Detections
 __all__ = ["representative"]
 
 
+@lru_cache(maxsize=2)
 def representative(detections: Detections, views: int) -> Detections:
-    """At most so many of the views, in their order; the detections themselves where there are no more.
+    """At most so many of the views, in their order, the same each time; the detections themselves where there
+    are no more.
 
     Args:
         views: how many are wanted.

@@ -9,26 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from orthoscope.fitting.calibration import Calibration
 from orthoscope.fitting.observations import Observations
+from orthoscope.fitting.slopes.linearised import SharedInverse
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.pose import Pose
 from orthoscope.methods.decoupled.evidence import Evidence, first_guess
 from orthoscope.methods.decoupled.normal_equations import SPACE, Measurements
-from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint
-from orthoscope.methods.decoupled.start import Start, nearer
+from orthoscope.methods.decoupled.problem import DecoupledEstimate, Joint, Known
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.spline import Displacement, Lattice
 from orthoscope.models.lenses.table import FREE
 from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
-from orthoscope.solve.least_squares import Options, solve
+from orthoscope.solve.least_squares import NormalEquations, Options, Solution, after_step, solve
 from orthoscope.solve.losses import Huber
 
-__all__ = ["FORMULA", "LAST_TOLERANCE", "StepOneFit", "fit_step_one", "polished"]
+__all__ = ["FORMULA", "StepOneFit", "fit_step_one", "polished"]
 
 # Beside FREE, a displacement over a formula, step 1's lens may be the formula alone, by this name.
 FORMULA = "formula"
@@ -37,8 +38,8 @@ FORMULA = "formula"
 ROUND_LIMIT = 6
 # A round ends at this tolerance.
 ROUND_TOLERANCE = 1e-3
-# The last round ends at this tolerance.
-LAST_TOLERANCE = 1e-9
+# The last round ends so where nothing else is said.
+TO_THE_LAST_DIGIT = Options(tolerance=1e-9, max_steps=50)
 # Independent errors reach so many standard deviations of a coordinate once in 3000, and count less beyond.
 FAR_DEVIATIONS = 4.0
 # Noise may change by this share before the loss does: its sums then need not be formed again.
@@ -58,17 +59,25 @@ class StepOneFit:
     it speaks for.
 
     Attributes:
-        covariance: (k,k) of the free parameters.
+        loss: how errors count.
+        inverse: of the sums at the estimate.
         steps, status: of the solver.
     """
 
     target: str
     problem: Joint
     estimate: DecoupledEstimate
+    loss: Huber
     evidence: Evidence
-    covariance: Float[ndarray, "k k"]
+    inverse: SharedInverse
     steps: int
     status: str
+
+    @property
+    def covariance(self) -> Float[ndarray, "k k"]:
+        """Of the free parameters."""
+        k = len(self.problem.free)
+        return self.evidence.noise * self.inverse.covariance[:k, :k]
 
     @property
     def views(self) -> int:
@@ -79,16 +88,6 @@ class StepOneFit:
     def poses(self) -> tuple[Pose, ...]:
         """camera_from_target of each view."""
         return self.problem.measurements.observations.poses_in_order(self.estimate.poses)
-
-    @property
-    def start(self) -> Start:
-        """For other fits to start from."""
-        return Start(self.estimate, self.evidence)
-
-    @property
-    def loss(self) -> Huber:
-        """How errors count, for noise as large as was found."""
-        return _loss(self.evidence.noise)
 
     def with_formula(self, camera: Camera, free: Sequence[str]) -> float:
         """For another camera in the place of the estimate's: how many parameters the data determine in
@@ -104,7 +103,7 @@ class StepOneFit:
             precisions=problem.precisions,
             parts=problem.parts,
         )  # fmt: skip
-        known = other.known(other.linearise(self.estimate._replace(camera=camera), self.loss))
+        known = other.minimum(other.linearise(self.estimate._replace(camera=camera), self.loss)).known
         return len(free) + float(known.surface.sum() + known.singles.sum())
 
     @property
@@ -124,7 +123,7 @@ def fit_step_one(
     shape: str,
     first_lens: str,
     near: StepOneFit | None = None,
-    tolerance: float = LAST_TOLERANCE,
+    ending: Options = TO_THE_LAST_DIGIT,
 ) -> StepOneFit:
     """Camera, poses and shape together.
 
@@ -132,76 +131,114 @@ def fit_step_one(
         flat: a calibration of a flat target to start from; its parameters are freed.
         shape: of the target, `flat`, `smooth` or `free`.
         first_lens: FREE or FORMULA, the lens.
-        near: another fit of the same target to start from as far as it goes, its base, shape, lens and views
-            whatever they are.
-        tolerance: of the last round.
+        near: a fit of the same model to some of the views, whose camera and target to start from.
+        ending: how the last round ends.
     """
     detections, free = flat.detections, flat.uncertainty.names
     observations = Observations.by_corner(detections)
     points, seen = detections.target.points, observations.present.max(0) > 0
     parts = detections.target.parts
     basis = polynomials(points, seen, parts=parts) if shape != "flat" else np.zeros((len(points), 0))
-    start = Start(
-        DecoupledEstimate(
-            _with_displacement(flat.camera) if first_lens == FREE else flat.camera,
-            observations.poses_of(flat.camera_from_target),
-            np.zeros((basis.shape[1], SPACE)),
-            np.zeros((len(points), SPACE)),
-        ),
-        first_guess(
-            0.5 * flat.rms_px**2, float(np.ptp(points[seen, :2], axis=0).max()), flat.camera.intrinsics.fx
-        ),
+    estimate = DecoupledEstimate(
+        _with_displacement(flat.camera) if first_lens == FREE else flat.camera,
+        observations.poses_of(flat.camera_from_target),
+        np.zeros((basis.shape[1], SPACE)),
+        np.zeros((len(points), SPACE)),
     )
-    if near:
-        start = nearer(start, near.start, free_corners=shape == "free")
-    estimate, evidence = start
-    energy = _energy(estimate.camera)
+    size = float(np.ptp(points[seen, :2], axis=0).max())
+    evidence = first_guess(0.5 * flat.rms_px**2, size, flat.camera.intrinsics.fx)
+    if near and near.estimate.surface.shape == estimate.surface.shape:
+        estimate, evidence = near.estimate._replace(poses=estimate.poses), near.evidence.awake()
     measurements = Measurements(observations, estimate.camera, free, corners_move=shape != "flat")
+    problem = Joint(
+        measurements,
+        points,
+        free,
+        surface=basis,
+        energy=_energy(estimate.camera),
+        single=shape == "free",
+        precisions=evidence.precisions(basis.shape[1]),
+        parts=parts,
+    )
     noise, loss = evidence.noise, _loss(evidence.noise)
-    steps, settled = 0, False
-    for round_ in range(ROUND_LIMIT):
-        last = settled or round_ == ROUND_LIMIT - 1
-        precisions = evidence.precisions(basis.shape[1])
-        problem = Joint(
-            measurements,
-            points,
-            free,
-            surface=basis,
-            energy=energy,
-            single=shape == "free",
-            precisions=precisions,
-            parts=parts,
-        )
-        options = Options(tolerance=tolerance if last else ROUND_TOLERANCE, max_steps=50)
+    place, steps = None, 0
+    for _ in range(ROUND_LIMIT - 1):
+        place = place or _Place(estimate, problem.measured(estimate, loss))
+        place, known, residuals, more = _round(problem, place, loss)
+        estimate, steps = place.estimate, steps + more
+        before = evidence
+        evidence = evidence.renewed(problem, estimate, known=known, loss=loss, residuals=residuals)
+        problem = problem.weighed(evidence.precisions(basis.shape[1]))
         if abs(evidence.noise / noise - 1.0) > KEPT_LOSS_SHARE:
-            noise, loss = evidence.noise, _loss(evidence.noise)
-        solution = solve(problem, estimate, loss=loss, options=options)
-        estimate, steps = solution.unknowns, steps + solution.steps
-        known = problem.known(solution.sums)
-        renewed = evidence.renewed(problem, estimate, solution.cost, known)
-        if last:
-            return StepOneFit(
-                shape, problem, estimate, renewed, renewed.noise * known.camera, steps, solution.status.value
-            )
-        settled = renewed.agrees_with(evidence)
-        evidence = renewed
-    raise AssertionError("the last round returns")
+            noise, loss, place = evidence.noise, _loss(evidence.noise), None
+        if evidence.agrees_with(before):
+            break
+    solution = solve(problem, estimate, loss=loss, options=ending)
+    return _told(shape, problem, solution, loss, evidence, steps)
 
 
 def polished(fit: StepOneFit) -> StepOneFit:
     """A fit that was stopped early brought to its minimum, weights as they are."""
-    solution = solve(
-        fit.problem, fit.estimate, loss=fit.loss, options=Options(tolerance=LAST_TOLERANCE, max_steps=50)
-    )
-    known = fit.problem.known(solution.sums)
-    evidence = fit.evidence.renewed(fit.problem, solution.unknowns, solution.cost, known)
-    return replace(
-        fit,
-        estimate=solution.unknowns,
-        evidence=evidence,
-        covariance=evidence.noise * known.camera,
-        steps=fit.steps + solution.steps,
-        status=solution.status.value,
+    solution = solve(fit.problem, fit.estimate, loss=fit.loss, options=TO_THE_LAST_DIGIT)
+    if not solution.steps:
+        return fit
+    return _told(fit.target, fit.problem, solution, fit.loss, fit.evidence, fit.steps)
+
+
+class _Place(NamedTuple):
+    """An estimate, and the sums of its measurements."""
+
+    estimate: DecoupledEstimate
+    sums: NormalEquations
+
+
+def _round(problem: Joint, place: _Place, loss: Huber) -> tuple[_Place, Known, Float[ndarray, "m p 2"], int]:
+    """Where the problem's cost is least, what is known there, the residuals, and how many steps it took.
+
+    One step that keeps its promise is enough, and the sums after it follow from those before.
+    """
+    sums = problem.with_priors(place.sums, place.estimate)
+    step = problem.minimum(sums)
+    there = problem.move(place.estimate, step.shared, step.blocks)
+    residuals = problem.residuals(there)
+    cost = problem.cost(there, loss, residuals)
+    if abs(cost - (sums.cost - step.promised)) <= ROUND_TOLERANCE * cost:
+        after = _Place(there, after_step(place.sums, step.shared, step.blocks))
+        return after, step.known, residuals, 1
+    start = there if cost < sums.cost else place.estimate
+    solution = solve(problem, start, loss=loss, options=Options(tolerance=ROUND_TOLERANCE, max_steps=50))
+    estimate = solution.unknowns
+    place = _Place(estimate, problem.measured(estimate, loss))
+    known = problem.minimum(solution.sums).known
+    return place, known, problem.residuals(estimate), 1 + solution.steps
+
+
+def _told(
+    target: str,
+    problem: Joint,
+    solution: Solution[DecoupledEstimate],
+    loss: Huber,
+    evidence: Evidence,
+    steps: int,
+) -> StepOneFit:
+    """The fit at the problem's minimum, and what it speaks for.
+
+    Args:
+        evidence: that the problem's weights are of.
+        steps: that led to where the solution began.
+    """
+    estimate, minimum = solution.unknowns, problem.minimum(solution.sums)
+    residuals = problem.residuals(estimate)
+    evidence = evidence.renewed(problem, estimate, known=minimum.known, loss=loss, residuals=residuals)
+    return StepOneFit(
+        target,
+        problem,
+        estimate,
+        loss,
+        evidence,
+        minimum.inverse,
+        steps + solution.steps,
+        solution.status.value,
     )
 
 

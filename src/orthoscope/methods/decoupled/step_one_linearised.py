@@ -24,7 +24,8 @@ __all__ = ["linearised", "linearised_flat", "roots_of"]
 
 def linearised(fit: StepOneFit) -> Linearised:
     """The fit at its estimate, with the weights of loss and priors that it ended with."""
-    return _linearised(fit.problem, fit.estimate, fit.loss, fit.evidence.noise)
+    fit.problem.measurements.forget()
+    return _linearised(fit.problem, fit.estimate, fit.loss, fit.evidence.noise, fit.inverse)
 
 
 def linearised_flat(calibration: Calibration) -> Linearised:
@@ -52,15 +53,15 @@ def linearised_flat(calibration: Calibration) -> Linearised:
         np.zeros((corners, SPACE)),
     )
     freedom = 2 * detections.corners - POSE * len(detections.views) - len(free)
-    noise = problem.linearise(estimate, loss).cost / max(freedom, 1)
-    return _linearised(problem, estimate, loss, noise)
+    sums = problem.linearise(estimate, loss)
+    return _linearised(problem, estimate, loss, sums.cost / max(freedom, 1), problem.minimum(sums).inverse)
 
 
-def _linearised(problem: Joint, estimate: DecoupledEstimate, loss: Loss, noise: float) -> Linearised:
+def _linearised(
+    problem: Joint, estimate: DecoupledEstimate, loss: Loss, noise: float, inverse: SharedInverse
+) -> Linearised:
     observations, points = problem.measurements.observations, problem.corners(estimate)
     moves = problem.single or problem.surface.shape[1] > 0
-    inverse = SharedInverse.of(problem.linearise(estimate, loss), by_corner=problem.by_corner)
-    problem.measurements.forget()
     slopes, residual = residual_slopes(
         observations, estimate.camera, estimate.poses, points, problem.free, moves=moves
     )

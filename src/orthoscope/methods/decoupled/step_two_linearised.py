@@ -85,9 +85,9 @@ class PairsLeftOut:
         patterns = patterns_over_views(known, self._fit.problem.points)
         model = np.einsum("mfn,mgn->fg", by_error, by_error) + prior
         alike = model.copy()
-        for rows, larger in zip(patterns, likenesses(known, patterns), strict=True):
+        for rows, likeness in zip(patterns, likenesses(known, patterns), strict=True):
             through = by_error @ rows
-            alike += (larger - 1.0) * np.einsum("mfc,mgc->fg", through, through)
+            alike += (likeness.tau - 1.0) * np.einsum("mfc,mgc->fg", through, through)
         s2 = known.noise
         return Scatter(
             self.camera,
@@ -96,7 +96,7 @@ class PairsLeftOut:
             s2 * alike,
             s2 * prior,
             scattered(self.changes, self._groups),
-            0.0 * model,
+            np.zeros((0, len(model))),
         )
 
     def _steps_one(

@@ -78,7 +78,7 @@ class FreeLens(Lens):
 
     def warp(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray]:
         b_x, b_y = self.base.warp(x, y)
-        s, _, _ = self.over.at(b_x, b_y)
+        s = self.over.shift(b_x, b_y)
         return b_x + s[..., 0], b_y + s[..., 1]
 
     def linearise(self, x: ndarray, y: ndarray, wanted: Sequence[str] = ()) -> Warp:
@@ -99,7 +99,7 @@ class FreeLens(Lens):
     def unwarp(self, x_d: ndarray, y_d: ndarray) -> tuple[ndarray, ndarray]:
         b_x, b_y = x_d, y_d
         for _ in range(BACK_ROUNDS):
-            s, _, _ = self.over.at(b_x, b_y)
+            s = self.over.shift(b_x, b_y)
             b_x, b_y = x_d - s[..., 0], y_d - s[..., 1]
         start = self.base.unwarp(b_x, b_y)
         outside = self.beyond_image(x_d, y_d)

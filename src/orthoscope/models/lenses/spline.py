@@ -13,6 +13,7 @@ Markov random fields, 2011): smooth where there are data, back to zero where the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,29 +87,56 @@ class Lattice:
         """How many there are."""
         return self.shape[0] * self.shape[1]
 
+    def reaches(self, x: ndarray, y: ndarray) -> ndarray:
+        """Whether some spline is not zero at places of any shape (...)."""
+        low = self.origin - (SPLINES_ACROSS_CELL - 1) * self.step
+        high = self.origin + self.shape * self.step
+        return (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1])
+
     def design(self, x: ndarray, y: ndarray) -> ndarray:
         """The value of every spline at places of any shape (...): (..., splines), y-major."""
-        across, down = self.along(x, 0)[0], self.along(y, 1)[0]
+        across, down = self.along(x, 0), self.along(y, 1)
         return (down[..., :, None] * across[..., None, :]).reshape(*x.shape, self.splines)
 
-    def along(self, places: ndarray, axis: int) -> tuple[ndarray, ndarray]:
-        """Values and slopes (..., n) of the n splines of one direction.
-
-        With a the distance from a spline's middle in cells: ((2 - a)+^3 - 4 (1 - a)+^3) / 6. Zero where a
-        place is no number.
+    def along(self, places: ndarray, axis: int) -> ndarray:
+        """Values (..., n) of the n splines of one direction; zero where a place is no number.
 
         Args:
             places: coordinates along the direction, of any shape (...).
             axis: the direction, 0 for x and 1 for y.
         """
-        t = (places - self.origin[axis]) / self.step[axis] + 1.0
-        offset = np.nan_to_num(t, nan=-SPLINES_ACROSS_CELL)[..., None] - np.arange(self.shape[axis])
-        distance = np.abs(offset)
-        outer, inner = np.maximum(2.0 - distance, 0.0), np.maximum(1.0 - distance, 0.0)
-        outer_squared, inner_squared = outer * outer, inner * inner
-        values = (outer_squared * outer - 4.0 * inner_squared * inner) / 6.0
-        slopes = np.sign(offset) * (2.0 * inner_squared - 0.5 * outer_squared) / self.step[axis]
-        return values, slopes
+        cell, t = self._cells(places, axis)
+        u, t2 = 1.0 - t, t * t
+        u2 = u * u
+        pieces = (u2 * u / 6.0, 2 / 3 - t2 * (1.0 - 0.5 * t), 2 / 3 - u2 * (1.0 - 0.5 * u), t2 * t / 6.0)
+        return self._spread(pieces, cell, axis)
+
+    def slopes_along(self, places: ndarray, axis: int) -> ndarray:
+        """The slopes of `along`."""
+        cell, t = self._cells(places, axis)
+        u, by_t = 1.0 - t, 1.0 / float(self.step[axis])
+        first, last = (-0.5 * by_t) * (u * u), (0.5 * by_t) * (t * t)
+        pieces = (first, (by_t * t) * (1.5 * t - 2.0), (by_t * u) * (2.0 - 1.5 * u), last)
+        return self._spread(pieces, cell, axis)
+
+    def _cells(self, places: ndarray, axis: int) -> tuple[ndarray, ndarray]:
+        """The first spline that is not zero at each place, counted from SPLINES_ACROSS_CELL before the first
+        there is, and how far through its cell the place is, 0 to 1.
+        """
+        t = (places - self.origin[axis]) / self.step[axis] + SPLINES_ACROSS_CELL
+        most = float(self.shape[axis] + SPLINES_ACROSS_CELL)
+        t = np.clip(np.nan_to_num(t, copy=False), 0.0, most)
+        cell = np.floor(t)
+        return cell.astype(np.intp), t - cell
+
+    def _spread(self, pieces: Sequence[ndarray], cell: ndarray, axis: int) -> ndarray:
+        """The pieces of a place's four splines, among all of the direction."""
+        n, side = self.shape[axis], self.shape[axis] + 2 * SPLINES_ACROSS_CELL + 1
+        out = np.zeros((cell.size, side))
+        first = cell.ravel() + side * np.arange(cell.size)
+        for i, piece in enumerate(pieces):
+            out.ravel()[first + i] = piece.ravel()
+        return out.reshape(*cell.shape, side)[..., SPLINES_ACROSS_CELL : SPLINES_ACROSS_CELL + n]
 
     def energy(self, reach: float) -> Float[ndarray, "g g"]:
         """The matrix E of the roughness c'Ec, the energy in the module's docstring.
@@ -146,18 +174,38 @@ class Displacement:
             frozen(self.coefficients, (self.lattice.splines, 2), "displacement: coefficients"),
         )
 
+    def shift(self, x: ndarray, y: ndarray) -> ndarray:
+        """s at places of any shape (...): (..., 2)."""
+        across, down = self.lattice.along(x, 0), self.lattice.along(y, 1)
+        return np.stack(
+            [np.einsum("...i,...i->...", across, down @ of_axis) for of_axis in self._of_axes], axis=-1
+        )
+
     def at(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray, ndarray]:
         """s, ds/dx and ds/dy at places of any shape (...), each (..., 2)."""
-        columns, rows = self.lattice.shape
-        across, across_slopes = self.lattice.along(x, 0)
-        down, down_slopes = self.lattice.along(y, 1)
+        near = self.lattice.reaches(x, y)
+        if near.all():
+            return self._at(x, y)
+        out = np.zeros((3, *x.shape, 2))
+        out[:, near] = self._at(x[near], y[near])
+        return out[0], out[1], out[2]
+
+    def _at(self, x: ndarray, y: ndarray) -> tuple[ndarray, ndarray, ndarray]:
+        """The same, of places that the lattice reaches."""
+        across, down = self.lattice.along(x, 0), self.lattice.along(y, 1)
+        across_slopes, down_slopes = self.lattice.slopes_along(x, 0), self.lattice.slopes_along(y, 1)
         out = np.empty((3, *x.shape, 2))
-        for axis, of_axis in enumerate(self.coefficients.T.reshape(2, rows, columns)):
+        for axis, of_axis in enumerate(self._of_axes):
             in_columns = down @ of_axis
             out[0, ..., axis] = np.einsum("...i,...i->...", across, in_columns)
             out[1, ..., axis] = np.einsum("...i,...i->...", across_slopes, in_columns)
             out[2, ..., axis] = np.einsum("...i,...i->...", across, down_slopes @ of_axis)
         return out[0], out[1], out[2]
+
+    @property
+    def _of_axes(self) -> Float[ndarray, "2 rows columns"]:
+        columns, rows = self.lattice.shape
+        return self.coefficients.T.reshape(2, rows, columns)
 
 
 def _grams(splines: int, step: float) -> tuple[ndarray, ndarray, ndarray]:

@@ -20,6 +20,8 @@ __all__ = ["board_corners", "boards", "boards_in", "frustum"]
 
 # The drawn frustum opens to at most this half angle, radians; a fisheye's has no flat front.
 WIDEST_FRUSTUM_ANGLE = np.deg2rad(55.0)
+# The frustum is measured by the distance than which one board in so many is nearer.
+ONE_NEARER_IN = 10
 
 
 def boards(evaluation: Evaluation) -> dict[str, Any] | str:
@@ -31,7 +33,7 @@ def boards(evaluation: Evaluation) -> dict[str, Any] | str:
     middles = np.array([pose.apply(outline).mean(0) for pose, outline in seen])
     if not len(middles):
         return "No photograph was used."
-    near = float(np.quantile(np.linalg.norm(middles, axis=-1), 0.1))
+    near = float(np.sort(np.linalg.norm(middles, axis=-1))[len(middles) // ONE_NEARER_IN])
     told = {"outlines": digits(outlines), "frustum": digits(frustum(calibration.camera, near / 3.0))}
     return told | ({"boards": of_views.tolist()} if len(outlines) > 1 else {})
 

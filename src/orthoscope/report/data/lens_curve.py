@@ -105,6 +105,7 @@ def _border(camera: Camera) -> Float[ndarray, "n 3"]:
     return camera.unproject(image_border(camera.image_size))
 
 
+@lru_cache(maxsize=1)
 def _edge(camera: Camera) -> float:
     """The largest angle from the axis in the frame: on its border where that has rays all around, else there
     and on a coarse grid inside, which still has rays where an image circle lies within the frame.
