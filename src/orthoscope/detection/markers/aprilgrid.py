@@ -6,10 +6,11 @@ which is seen by its neighbours, where there are any, since all tags of a board 
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
-from orthoscope.detection.markers.markers import Markers, find_markers, of_one_board, remark_on
+from orthoscope.detection.markers.markers import Markers, find_markers, homography_of, of_one_board, remark_on
 from orthoscope.detection.saddles.linked import hang_together
 from orthoscope.detection.saddles.refine import refined
 from orthoscope.detection.sight import Sight, Unseen
@@ -36,6 +37,9 @@ FEWEST_CORNERS = 4
 FARTHEST_SHARE = 0.4
 # A gap counts as at least this, pixels: by 4 the tags' own corners may be off, however small the gaps.
 LEAST_GAP_PX = 10.0
+# Tags may be larger than OpenCV sees them by these factors; at their corners the grey is looked at so many of
+# a tag's squares from there.
+SCALES, LOOKED_AT = (1.0, 1.08, 1.16, 1.25), 1.0
 # So many corners around it foresee one.
 FORESEEING_CORNERS = 16
 
@@ -52,6 +56,7 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
     numbers = found.numbers - board.first
     known = (numbers >= 0) & (numbers < count)
     markers = Markers(numbers[known], found.corners[known])
+    markers = markers._replace(corners=_at_corner_squares(grey, markers.corners))
     ids, corners, remark = _of_board(markers, board)
     inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(1)
     ids, corners = ids[inside], corners[inside]
@@ -78,6 +83,33 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
     ids, pixels = ids[linked], pixels[linked]
     order = np.argsort(ids)
     return Sight(ids[order], pixels[order], remark)
+
+
+def _at_corner_squares(grey: ndarray, corners: Float[ndarray, "n 4 2"]) -> Float[ndarray, "n 4 2"]:
+    """The tags' corners, of those that OpenCV saw too small moved out to where the squares between tags are.
+
+    A threshold hollows a wide border out, and blur parts a tag from the squares at its corners: what is taken
+    for the tag's outline is then inside it. At a true corner black is on one diagonal, white on the other.
+    """
+    if not len(corners):
+        return corners
+    unit = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    near = LOOKED_AT / TAG_SQUARES * np.array([[1.0, 1.0], [-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0]])
+    scales = np.array(SCALES)
+    places = scales[:, None, None, None] * unit[:, None] + 2.0 * near * unit[:, None]
+    maps = (homography_of(unit, each) for each in corners)
+    there = np.stack([cv2.perspectiveTransform(places.reshape(1, -1, 2), each)[0] for each in maps])
+    x, y = np.clip(np.rint(there), 0, np.array(grey.shape[::-1]) - 1).astype(int).transpose(2, 0, 1)
+    seen = grey[y, x].astype(float).reshape(len(corners), len(scales), 4, 4)
+    white, black = seen[..., 2:], seen[..., :2]
+    strength = np.maximum(white.min(-1) - black.max(-1), black.min(-1) - white.max(-1)).sum(2)
+    best = scales[strength.argmax(1)]
+    return np.stack(
+        [
+            cv2.perspectiveTransform((scale * unit)[None], homography_of(unit, each))[0]
+            for scale, each in zip(best, corners, strict=True)
+        ]
+    )
 
 
 def _fitted(

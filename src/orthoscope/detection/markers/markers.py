@@ -24,6 +24,8 @@ __all__ = ["Markers", "find_markers", "homography_of", "of_one_board", "remark_o
 
 # Copies have these longer sides, pixels.
 COPY_SIDES = (1280, 640, 2560)
+# Pictures with a longer side of up to this, pixels, are enlarged where some but not enough markers were read.
+LARGEST_ENLARGED = 1400
 # Its neighbours foresee a marker, at worst, to this share of its side.
 LOOSE_SHARE = 0.6
 # With at most so many markers found, white ones on black are looked for, or a negative's.
@@ -72,8 +74,12 @@ def _most_markers(
     """The markers of the copy that shows most, black on white; and the first copy."""
     best, first = Markers(np.zeros(0, dtype=int), np.zeros((0, 4, 2))), None
     shapes = set()
-    for side in COPY_SIDES:
-        copy = resized(grey, side)
+    for side in (*COPY_SIDES, 0):
+        if not side and (not len(best.numbers) or max(grey.shape) > LARGEST_ENLARGED):
+            break  # enlarged where that may show more of those that are there
+        copy = (
+            resized(grey, side) if side else cv2.resize(grey, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
+        )
         if copy.shape in shapes or min(copy.shape) < 16:
             continue
         shapes.add(copy.shape)

@@ -118,7 +118,7 @@ class _Fit:
         self.contrast, self.explained = np.zeros((2, len(start)))
         self.sums = np.zeros((len(start), COLUMN_COUNT + 1, COLUMN_COUNT + 1))
         self.noise = np.zeros(len(start))
-        self.half = np.sqrt(np.maximum((along**2).sum(1), (down**2).sum(1)))
+        self.half = np.sqrt(np.maximum(np.maximum((along**2).sum(1), (down**2).sum(1)), 1e-12))
         self.area = 4.0 * np.abs(along[:, 0] * down[:, 1] - along[:, 1] * down[:, 0])
         self.by_size = np.argsort(self.area, kind="stable")
 
