@@ -52,7 +52,7 @@ LEAST_CONTRAST_SHARE = 0.35
 # Where the saddle leaves at most so much more of a window than of most, as a share of its variance, nothing
 # covers it; where much is noise, the arms are asked wherever more than this share of that is left.
 HARDLY_UNEXPLAINED, HARDLY_UNEXPLAINED_NOISE = 0.005, 0.1
-# Where the arms are known better than this, pixels, what is left is that the window's squares are not alike.
+# Where the arms are known better than this, pixels, and agree, what is left is that squares are not alike.
 SMALL_ARM_SPREAD = 0.2
 # What no arm tells from noise leaves at most so much more than of most, and of the share that is noise.
 MOST_UNEXPLAINED, MOST_UNEXPLAINED_NOISE = 0.03, 0.3
@@ -145,7 +145,7 @@ def refined(
 def _have_whole_arms(told: SaddleArms, little: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:
     """Which saddles have arms that agree; or whose noise hides it, and which leave little else."""
     shifts = np.abs(told.shifts)
-    agree = (shifts < MOST_ARM_SHIFT).all(1)
+    agree = ((shifts < MOST_ARM_SHIFT) & (told.spread < SMALL_ARM_SPREAD)).all(1)
     differ = (shifts > np.maximum(MOST_ARM_SHIFT, MOST_ARM_SPREADS * told.spread)).any(1)
     return (agree | little) & ~differ & (told.steps > LEAST_ARM_STEP_SHARE).all(1)
 
