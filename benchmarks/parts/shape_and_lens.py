@@ -22,7 +22,8 @@ ABOUT = (
     "Process CPU time of one call, one thread, the best of several rounds. Released target: every corner of"
     " the board its own place, on the 20 views of calibrel (160 corners each) against calibrateCameraRO with"
     " LU, and on simulated views of 14x20 corners. Free lens: a spline over a formula, against mrcal's"
-    " splined stereographic lens of 16x12 knots (board flat, no outlier rejection) and lensboy's."
+    " splined stereographic lens of 16x12 knots (board flat, no outlier rejection) and lensboy's. Each is"
+    " told its one model, ours the formula under it, brown."
 )
 
 

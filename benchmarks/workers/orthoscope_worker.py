@@ -20,9 +20,12 @@ SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {  # what is called for each n
     "brown": ("fccm", {"lens": "brown"}),
     "rational": ("fccm", {"lens": "rational"}),
     "kannala_brandt": ("fccm", {"lens": "kannala_brandt"}),
-    "free target": ("decoupled", {"shape": "free", "lens": "brown", "first_lens": "formula"}),
-    "free lens": ("decoupled", {"shape": "flat", "lens": "free"}),
-    "free target and lens": ("decoupled", {"shape": "free", "lens": "free"}),
+    "free target": (
+        "decoupled",
+        {"shape": "free", "lens": "brown", "base": "brown", "first_lens": "formula"},
+    ),
+    "free lens": ("decoupled", {"shape": "flat", "lens": "free", "base": "brown"}),
+    "free target and lens": ("decoupled", {"shape": "free", "lens": "free", "base": "brown"}),
     "chosen by itself": ("decoupled", {}),
 }
 
