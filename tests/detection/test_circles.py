@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from orthoscope.detection.detect import detect
 from orthoscope.detection.discs.circles import see_circles
+from orthoscope.detection.discs.disc_fit import fit_discs
 from orthoscope.detection.discs.disc_outlines import refined_discs
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.fitting.disc_centres import disc_offsets
@@ -102,3 +104,38 @@ def test_a_disc_that_is_partly_covered_is_left_out():
     assert isinstance(sight, Sight)
     assert 12 not in sight.ids
     assert np.linalg.norm(sight.pixels - truth[sight.ids], axis=1).max() < 0.3
+
+
+def blurred_discs(rng: np.random.Generator, *, radius: float, blur: float, noise: float, count: int = 36):
+    """A picture of discs in rows of six, their centres and the half step from inside to outside."""
+    apart, step = 4.0 * radius, 75.0
+    centres = np.stack(np.divmod(np.arange(count), 6)[::-1], axis=1) * apart + 0.7 * apart
+    centres = centres + rng.uniform(-0.5, 0.5, centres.shape)
+    side = int(6 * apart + 0.5 * apart)
+    y, x = np.mgrid[:side, :side].astype(float)
+    nearest = np.full(x.shape, np.inf)
+    for column, row in centres:
+        np.minimum(nearest, np.hypot(x - column, y - row), out=nearest)
+    grey = 110.0 + step * np.tanh((nearest - radius) / blur) * (1.0 + 0.1 * x / side)
+    grey += rng.normal(0.0, noise, grey.shape)
+    return np.rint(grey).astype(np.uint8), centres, step
+
+
+@pytest.mark.parametrize(("radius", "blur", "noise"), [(11.0, 0.9, 2.0), (18.0, 1.5, 6.0), (30.0, 2.0, 4.0)])
+def test_a_disc_is_found_as_well_as_noise_allows(radius, blur, noise):
+    grey, centres, step = blurred_discs(np.random.default_rng(3), radius=radius, blur=blur, noise=noise)
+    rough = Ellipses(centres + 0.4, np.tile(1.03 * radius * np.eye(2), (len(centres), 1, 1)))
+    fit = fit_discs(grey, rough)
+    # a rim of 2 pi R pixels, each of which tells the edge by step^2 / blur^2 times the sum of sech^4
+    told = np.pi * radius * (step / blur) ** 2 * (4.0 / 3.0) * blur / noise**2
+    rms = np.sqrt(((fit.ellipses.centres - centres) ** 2).mean())
+    assert rms < 1.35 / np.sqrt(told)  # of 72 coordinates the rms is known to 8 %
+    assert (np.abs(fit.off) < 4.5 * fit.spread + 0.02).all()
+
+
+def test_what_covers_a_disc_moves_a_sector_of_its_outline():
+    grey, centres, _ = blurred_discs(np.random.default_rng(4), radius=11.0, blur=1.2, noise=3.0)
+    cv2.circle(grey, tuple(np.rint(centres[14] + (12, 3)).astype(int).tolist()), 6, 180, -1)
+    fit = fit_discs(grey, Ellipses(centres, np.tile(11.0 * np.eye(2), (len(centres), 1, 1))))
+    moved = (np.abs(fit.off) > 4.5 * fit.spread + 0.02).any(1)
+    assert np.flatnonzero(moved).tolist() == [14]

@@ -61,6 +61,18 @@ def test_a_length_that_is_not_understood_is_refused(text):
 
 
 @pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("charuco:7x5:30:22mm:DICT_5X5_100", "30mm, where it is millimetres"),
+        ("charuco:7x5:30mm:22mm:5x5_100", "Say DICT_5X5_100"),
+    ],
+)
+def test_what_was_left_out_of_a_description_is_said(text, hint):
+    with pytest.raises(InputError, match=hint):
+        parse_target(text)
+
+
+@pytest.mark.parametrize(
     "text",
     ["chessboard", "chessboard:9x6", "chessboard:9:6:25mm", "rings:9x6:25mm", "chessboard:9.5x6:25mm", ""],
 )

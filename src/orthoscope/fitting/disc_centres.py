@@ -4,8 +4,8 @@ A tilted disc's image is an ellipse whose centre is not the image of the disc's 
 larger than the far one. With r the disc's radius, f the focal length, d its distance and t its tilt they are
 about f (r/d)^2 sin t cos t apart, pixels, all towards the same side of a view, so that a calibration takes it
 for tilt and distortion. A lens that distorts moves the centre once more. Once a camera and the poses are
-known the offset is too: points on the rim are projected and an ellipse is fitted to them, as the detector did
-to the outline.
+known the offset is too: points on the rim are projected and an ellipse is fitted to them, each by the length
+of rim that it stands for, as the detector did to the outline's pixels.
 
 J. Heikkila, Geometric camera calibration using circular control points, TPAMI 22(10), 2000, has the offset
 of a pin-hole in closed form.
@@ -28,7 +28,7 @@ from orthoscope.targets.detections import Detections, View
 
 __all__ = ["at_disc_centres", "disc_offsets", "has_outlines"]
 
-# A disc's outline has as many points here as the detector looks for.
+# A disc's outline has so many points.
 RIM_POINTS = 48
 
 
@@ -57,7 +57,7 @@ def disc_offsets(
     around = camera_from_target.apply(rims.reshape(-1, 3))
     outlines = camera.project(around, beyond=True).reshape(-1, RIM_POINTS, 2)
     centres = camera.project(camera_from_target.apply(points), beyond=True)
-    return np.nan_to_num(fit_ellipses(outlines).centres - centres)
+    return np.nan_to_num(fit_ellipses(outlines, by_length=True).centres - centres)
 
 
 def at_disc_centres(

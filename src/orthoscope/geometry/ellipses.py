@@ -38,27 +38,42 @@ class Ellipses(NamedTuple):
         return Ellipses(self.centres[which], self.axes[which])
 
 
-def fit_ellipses(rims: Float[ndarray, "n k 2"]) -> Ellipses:
+def fit_ellipses(rims: Float[ndarray, "n k 2"], *, by_length: bool = False) -> Ellipses:
     """The ellipse through each row of points.
 
     Args:
         rims: points on each rim; NaN for one that is missing.
+        by_length: whether points, which are then in order, count by the length of rim that each stands for,
+            as they do where a rim is seen by its pixels, and not each alike.
     """
+    found = _fitted(rims, np.ones(rims.shape[:2]))
+    if by_length:
+        lengths = np.linalg.norm(np.roll(rims, -1, axis=1) - np.roll(rims, 1, axis=1), axis=2)
+        inverse = np.linalg.inv(np.where(np.isfinite(found.axes), found.axes, np.eye(2)))
+        out = (rims - found.centres[:, None]) @ inverse
+        steep = ((out @ inverse) ** 2).sum(2)  # square of a step in radii over one in pixels
+        found = _fitted(rims, np.nan_to_num(lengths / np.maximum(steep, 1e-12)))
+    return found
+
+
+def _fitted(rims: Float[ndarray, "n k 2"], weights: Float[ndarray, "n k"]) -> Ellipses:
     seen = np.isfinite(rims[..., 0])
-    count = np.maximum(seen.sum(1), 1)[:, None]
+    weights = np.where(seen, weights, 0.0)
+    weights = weights / np.maximum(weights.max(1, keepdims=True), 1e-300)
+    count = np.maximum(weights.sum(1), 1e-9)[:, None]
     points = np.where(seen[..., None], rims, 0.0)
-    middle = points.sum(1) / count
+    middle = (points * weights[..., None]).sum(1) / count
     points = np.where(seen[..., None], rims - middle[:, None], 0.0)
-    spread = np.einsum("nki,nkj->nij", points, points) / count[..., None] * 2.0
+    spread = np.einsum("nki,nkj,nk->nij", points, points, weights) / count[..., None] * 2.0
     usable = (seen.sum(1) >= FEWEST_POINTS) & (np.linalg.det(spread) > 0)
     spread[~usable] = np.eye(2)
     whole = np.linalg.cholesky(spread)
     x, y = np.moveaxis(np.linalg.solve(whole[:, None], points[..., None])[..., 0], -1, 0)
     terms = np.stack([x * x, x * y, y * y, x, y], axis=-1)
-    normal = np.einsum("nki,nkj->nij", terms, terms)
+    normal = np.einsum("nki,nkj,nk->nij", terms, terms, weights)
     usable &= np.linalg.cond(normal) < 1e10
     normal[~usable] = np.eye(5)
-    a, b, c, d, e = np.linalg.solve(normal, terms.sum(1)[..., None])[..., 0].T
+    a, b, c, d, e = np.linalg.solve(normal, (terms * weights[..., None]).sum(1)[..., None])[..., 0].T
     quadratic = np.stack([a, 0.5 * b, 0.5 * b, c], axis=-1).reshape(-1, 2, 2)
     values, vectors = np.linalg.eigh(quadratic)
     usable &= values[:, 0] > 1e-9

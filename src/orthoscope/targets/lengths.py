@@ -32,9 +32,11 @@ def parse_length(text: str) -> float:
     try:
         return float(found[1]) * METRES[found[2]]  # type: ignore[index]
     except (TypeError, ValueError, KeyError) as error:
+        bare = re.fullmatch(r"\s*([0-9.]+)\s*", text)
+        hint = f" Say which: {bare[1]}mm, where it is millimetres." if bare else ""
         raise InputError(
             f"length {text!r} is not understood; expected a number and a unit ({', '.join(METRES)}), such as"
-            " 25mm."
+            f" 25mm.{hint}"
         ) from error
 
 

@@ -24,6 +24,8 @@ __all__ = [
     "split_first",
 ]
 
+# All names of OpenCV's dictionaries begin so.
+PREFIX = "DICT_"
 # What stands at the end of a description before the number of a board's first marker.
 FIRST = "first="
 
@@ -37,10 +39,12 @@ def dictionary(name: str) -> Any:
     """
     import cv2
 
-    number = getattr(cv2.aruco, name, None) if name.startswith("DICT_") else None
+    number = getattr(cv2.aruco, name, None) if name.startswith(PREFIX) else None
     if number is None:
-        names = sorted(other for other in dir(cv2.aruco) if other.startswith("DICT_"))
-        raise InputError(f"dictionary {name!r} is not known; expected one of {', '.join(names)}.")
+        names = sorted(other for other in dir(cv2.aruco) if other.startswith(PREFIX))
+        meant = f"{PREFIX}{name.upper()}"
+        hint = f" Say {meant}." if meant in names else ""
+        raise InputError(f"dictionary {name!r} is not known; expected one of {', '.join(names)}.{hint}")
     return cv2.aruco.getPredefinedDictionary(number)
 
 

@@ -31,6 +31,7 @@ from orthoscope.detection.chessboards.partial_board import (
     is_even,
     laid_out,
     placements,
+    without_lost_lines,
 )
 from orthoscope.detection.saddles.linked import are_linked
 from orthoscope.detection.saddles.refine import Refined, refined
@@ -203,8 +204,13 @@ def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, l
                 yield one, copy, found[number:]
 
 
-def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> _Laid | None:
-    """The corners with their ids, refined; None where the grid is not the board's or the ids are open."""
+def _on_board(
+    grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard, *, again: bool = True
+) -> _Laid | None:
+    """The corners with their ids, refined; None where the grid is not the board's or the ids are open.
+
+    Where whole lines of the grid are no corners it was none of the board's; what is left is numbered `again`.
+    """
     ways = placements(grid, board.columns, board.rows)
     arms = np.ones(grid.seen.shape)
     if isinstance(board, MarkedChessboard):
@@ -217,6 +223,8 @@ def _on_board(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -
     if isinstance(board, MarkedChessboard):
         arms[np.isin(ids, board.marked_corners())] = board.arm
     pixels, good, sure = _refined(grey, grid.corners, grid.seen, arms)
+    if (less := without_lost_lines(grey, grid, pixels, good, max(board.grid))) and again:
+        return _on_board(grey, less, board, again=False)
     order = np.argsort(ids[good])
     return _Laid(ids[good][order], pixels[good][order], sure[good][order])
 

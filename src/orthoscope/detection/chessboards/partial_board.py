@@ -32,6 +32,7 @@ __all__ = [
     "is_even",
     "laid_out",
     "placements",
+    "without_lost_lines",
 ]
 
 # A corner strays from the parabolas of its row and column by at most this share of a step.
@@ -158,6 +159,26 @@ def grid_of(grey: ndarray, corners: Float[ndarray, "r c 2"], most: int) -> Grid:
     """The grid of corners that some finder returned, taken as far as it goes."""
     bright = bool(alternating(grey, corners).sum() > 0)
     return _taken_further(grey, corners, np.ones(corners.shape[:2], dtype=bool), bright, most)
+
+
+def without_lost_lines(
+    grey: ndarray, grid: Grid, corners: Float[ndarray, "r c 2"], seen: Bool[ndarray, "r c"], most: int
+) -> Grid | None:
+    """The grid of the lines of which corners are left, where there are fewer than it had; None otherwise.
+
+    Args:
+        grey: (h,w) uint8.
+        grid: as it was.
+        corners: its corners now.
+        seen: which of them are left.
+        most: lines that are added at most.
+    """
+    box = _box(seen)
+    if box is None or seen[box].shape == seen.shape:
+        return None
+    known = np.where(seen[..., None], corners, np.nan)[box]
+    bright = grid.bright ^ bool((box[0].start + box[1].start) % 2)
+    return _taken_further(grey, filled(known), seen[box], bright, most)
 
 
 def filled(grid: Float[ndarray, "r c 2"], *, rounds: int = 1000) -> Float[ndarray, "r c 2"]:

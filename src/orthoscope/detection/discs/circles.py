@@ -12,10 +12,10 @@ from orthoscope.detection.discs.disc_lattice import (
     diameter_in_steps,
     foreseen,
     laid_on,
-    like_the_others,
     numbered,
 )
 from orthoscope.detection.discs.disc_outlines import refined_discs, spots
+from orthoscope.detection.discs.whole_discs import are_whole
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.small_copies import resized, to_photograph
 from orthoscope.geometry.arrays import Int, ndarray
@@ -47,7 +47,7 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
     """
     count = board.columns * board.rows
     best = Sight(np.zeros(0, dtype=int), np.zeros((0, 2)))
-    several, seen, shapes = False, 0, set()
+    several, laid, seen, shapes = False, False, 0, set()
     for side in COPY_SIDES:
         copy = resized(grey, side)
         if copy.shape in shapes or min(copy.shape) < SMALLEST_SIDE:
@@ -63,6 +63,7 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
                 ids, unsure = laid_on(board, discs, places, copy.shape)
                 several |= unsure
                 if (ids >= 0).sum() >= FEWEST_DISCS:
+                    laid = True
                     best = max(
                         best, _outlined(copy, whole, board, discs, ids), key=lambda sight: len(sight.ids)
                     )
@@ -70,6 +71,8 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
                     return best
     if len(best.ids) >= FEWEST_DISCS:
         return best
+    if laid:
+        return Unseen("is in it, but too blurred, dim or small to say where its discs are")
     if several:
         return Unseen("is in it in part only, and which part cannot be told")
     return Unseen(f"was not found in it: {seen} discs hang together, the board has {count}")
@@ -82,27 +85,24 @@ def _outlined(
     scale = grey.shape[1] / copy.shape[1]
     mine = ids >= 0
     rough = Ellipses(to_photograph(discs.centres[mine], copy, grey), discs.axes[mine] * scale)
-    known, (fine, roughness) = ids[mine], refined_discs(grey, rough)
+    known, fine = ids[mine], refined_discs(grey, rough)
     unlike = known[:0]
     for _ in range(board.columns + board.rows):
-        good = np.isfinite(fine.centres[:, 0])
-        known, fine, roughness = known[good], fine.of(good), roughness[good]
-        good = like_the_others(board, fine, known, roughness)
+        good = np.isfinite(fine.ellipses.centres[:, 0])
+        known, fine = known[good], fine.of(good)
+        good = are_whole(board, fine, known)
         unlike = np.union1d(unlike, known[~good])
-        known, fine, roughness = known[good], fine.of(good), roughness[good]
+        known, fine = known[good], fine.of(good)
         if len(known) < FEWEST_DISCS:
             break
-        more, there = foreseen(board, fine, known, grey.shape)
-        added, rough_added = refined_discs(grey, there)
-        off = np.linalg.norm(added.centres - there.centres, axis=1)
+        more, there = foreseen(board, fine.ellipses, known, grey.shape)
+        added = refined_discs(grey, there)
+        off = np.linalg.norm(added.ellipses.centres - there.centres, axis=1)
         near = ~np.isin(more, unlike) & (off < FARTHEST_RADII * np.sqrt(np.abs(np.linalg.det(there.axes))))
         if not near.any():
             break
-        known = np.concatenate([known, more[near]])
-        roughness = np.concatenate([roughness, rough_added[near]])
-        fine = Ellipses(
-            np.concatenate([fine.centres, added.centres[near]]), np.concatenate([fine.axes, added.axes[near]])
-        )
+        known, fine = np.concatenate([known, more[near]]), fine.with_more(added.of(near))
+        fine = refined_discs(grey, fine.ellipses)  # which leaves out what is near to another
     order = np.argsort(known)
-    diameter = diameter_in_steps(fine, board.neighbour_places()[known]) * board.nearest
-    return Sight(known[order], fine.centres[order], diameter=diameter)
+    diameter = diameter_in_steps(fine.ellipses, board.neighbour_places()[known]) * board.nearest
+    return Sight(known[order], fine.ellipses.centres[order], diameter=diameter)

@@ -12,14 +12,15 @@ but for the board's own symmetry.
 from __future__ import annotations
 
 from collections import deque
+from functools import lru_cache
 
 import numpy as np
 
-from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
+from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.circles import Circles
 
-__all__ = ["diameter_in_steps", "foreseen", "laid_on", "like_the_others", "numbered"]
+__all__ = ["FORESEEING_DISCS", "diameter_in_steps", "foreseen", "foretelling", "laid_on", "numbered"]
 
 # So many discs may be next to one.
 NEIGHBOUR_CANDIDATES = 12
@@ -41,20 +42,8 @@ RIVAL_SHARE = 0.5
 MOST_SPOTS_OFF_BOARD = 1
 # So many discs nearby foresee one.
 FORESEEING_DISCS = 12
-# With no more than so many discs nearby none is foreseen well enough to compare with.
-FEWEST_FORESEEING = 5
 # A disc is seen when it is in the picture with its radii multiplied by this.
 SEEN_MARGIN = 1.25
-
-# A disc's outline is at most so many times as rough as is usual, or this rough, radii.
-MOST_ROUGH, SMOOTH_RADII = 3.0, 0.03
-# A disc's radius is at most this share off what those near it foresee, or so many times the usual share.
-MOST_OFF_SIZE, TIMES_OFF_SIZE = 0.1, 5.0
-# A disc's centre is at most so many of its radii off from where those near it foresee it, or so many times as
-# far as is usual; one that is rough or of another size then not more than so many pixels.
-MOST_OFF_PLACE, TIMES_OFF_PLACE, MOST_OFF_PX = 0.15, 6.0, 0.8
-# A disc whose outline is rougher than this, radii, or its radius off by more than this share, may be covered.
-SURELY_SMOOTH, SURELY_AS_LARGE = 0.015, 0.03
 
 
 def numbered(discs: Ellipses) -> tuple[Int[ndarray, " n"], Int[ndarray, "n 2"]]:
@@ -207,7 +196,7 @@ def foreseen(
     where, like = [], []
     for k in next_to:
         nearest = np.argsort(apart[k], kind="stable")[:FORESEEING_DISCS]
-        where.append(_foretelling(places[known[nearest]] - places[missing[k]]) @ centres[nearest])
+        where.append(foretelling(places[known[nearest]] - places[missing[k]]) @ centres[nearest])
         like.append(axes[nearest[0]])
     found = Ellipses(np.array(where).reshape(-1, 2), np.array(like).reshape(-1, 2, 2))
     reach = SEEN_MARGIN * np.linalg.norm(found.axes, axis=2)
@@ -215,44 +204,17 @@ def foreseen(
     return missing[next_to][inside], Ellipses(found.centres[inside], found.axes[inside])
 
 
-def like_the_others(
-    board: Circles, discs: Ellipses, ids: Int[ndarray, " n"], roughness: Float[ndarray, " n"]
-) -> Bool[ndarray, " n"]:
-    """Which discs are as large, as smooth and where those near them foresee it; others are partly covered.
-
-    Args:
-        board: what was photographed.
-        discs: that were found.
-        ids: of these.
-        roughness: of their outlines, radii.
-    """
-    if not len(ids):
-        return np.zeros(0, dtype=bool)
-    places, radii = board.neighbour_places()[ids], np.sqrt(np.abs(np.linalg.det(discs.axes)))
-    good = roughness < max(MOST_ROUGH * median(roughness), SMOOTH_RADII)
-    known = np.column_stack([discs.centres, np.log(radii)])
-    off_place, off_size = np.zeros((2, len(ids)))
-    for number in range(len(ids)):
-        others = np.flatnonzero(good & (np.arange(len(ids)) != number))
-        apart = np.abs(places[others] - places[number]).sum(-1)
-        nearest = others[np.argsort(apart, kind="stable")[:FORESEEING_DISCS]]
-        if len(nearest) > FEWEST_FORESEEING:
-            weights = _foretelling(places[nearest] - places[number])
-            told, reach = weights @ known[nearest], max(1.0, float(np.linalg.norm(weights)))
-            off_place[number] = np.hypot(*(told - known[number])[:2]) / radii[number] / reach
-            off_size[number] = abs(told[2] - known[number, 2]) / reach
-    usual = np.full(len(ids), TIMES_OFF_PLACE * median(off_place))
-    suspect = (roughness > SURELY_SMOOTH) | (off_size > SURELY_AS_LARGE)
-    usual[suspect] = np.minimum(usual, MOST_OFF_PX / radii)[suspect]
-    good &= off_place < np.maximum(MOST_OFF_PLACE, usual)
-    return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
-
-
-def _foretelling(steps: Int[ndarray, "k 2"]) -> Float[ndarray, " k"]:
+def foretelling(steps: Int[ndarray, "k 2"]) -> Float[ndarray, " k"]:
     """By what weights discs so many steps away foretell here: by a parabola, few discs by a plane."""
-    x, y = steps.T.astype(float)
+    return _weights(tuple(steps.ravel().tolist()))
+
+
+@lru_cache(maxsize=4096)
+def _weights(steps: tuple[int, ...]) -> Float[ndarray, " k"]:
+    """As above; the discs of a lattice have the same neighbours again and again."""
+    x, y = np.array(steps, dtype=float).reshape(-1, 2).T
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-    enough = len(x) >= FORESEEING_DISCS and min(len(np.unique(x)), len(np.unique(y))) >= 3
+    enough = len(x) >= FORESEEING_DISCS and min(len(set(steps[::2])), len(set(steps[1::2]))) >= 3
     return np.linalg.pinv(terms[:, : 6 if enough else 3])[0]
 
 

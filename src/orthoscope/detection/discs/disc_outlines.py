@@ -18,7 +18,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.detection.discs.disc_fit import fit_discs
+from orthoscope.geometry.arrays import Bool, Float, ndarray
 from orthoscope.geometry.ellipses import Ellipses, fit_ellipses
 
 __all__ = ["Outlines", "refined_discs", "spots"]
@@ -45,9 +46,9 @@ MOST_AXIS_RATIO = 12.0
 # More spots than this are noise.
 MOST_SPOTS = 4000
 # An outline is sought along so many rays.
-RAY_COUNT = 48
+RAY_COUNT = 32
 # A ray has so many samples.
-RAY_SAMPLES = 41
+RAY_SAMPLES = 31
 # The outline is sought from this share of the radius on.
 INNER_RADIUS = 0.45
 # The outline is sought up to this many radii; a neighbour begins beyond.
@@ -55,11 +56,23 @@ OUTER_RADIUS = 1.45
 # The levels inside and outside are taken over this share of a radius at either end.
 LEVEL_RADII = 0.25
 # An outline is refined so many times.
-REFINING_ROUNDS = 3
+REFINING_ROUNDS = 2
 # Inside and outside differ by more than so many grey levels.
 LEAST_CONTRAST = 8.0
+# A contrast counts as at least this share.
+LEAST_SHARE = 1e-3
 # An outline's rms about its ellipse is less than this, radii.
 MOST_ROUGHNESS = 0.12
+# A disc that is fitted as a whole has a shorter half axis of at least so many blurs.
+LEAST_BLURS = 1.5
+# Of a sure centre the standard deviation is less than this, pixels: it is within a pixel then, as good as
+# always.
+WIDEST_SPREAD = 0.2
+# The fit of a whole disc ends within this share of its radius from there.
+FARTHEST_RADII = 0.25
+# A sector of a whole disc's outline is off the ellipse by less than this share of a radius, or so many
+# standard deviations.
+MOST_SECTOR_RADII, MOST_SECTOR_SPREADS = 0.02, 4.0
 # At least this share of the rays meets the outline.
 LEAST_RAYS_SHARE = 0.9
 # The picture is smoothed with this sigma, pixels.
@@ -115,12 +128,29 @@ def _covariances(labels: ndarray, fits: ndarray, middles: ndarray) -> Float[ndar
 
 
 class Outlines(NamedTuple):
-    """ellipses: through the outlines of n discs, NaN where there is no whole one.  roughness: (n,) rms of an
-    outline about its ellipse, in radii.
+    """Outlines of n discs.
+
+    Attributes:
+        ellipses: through them, NaN where there is no whole one.
+        roughness: (n,) rms of an outline about its ellipse, in radii.
+        contrast: (n,) from inside to outside, as a share of the outside.
+        wide: (n,) whether it is wide enough beside the blur to be fitted whole.
     """
 
     ellipses: Ellipses
     roughness: Float[ndarray, " n"]
+    contrast: Float[ndarray, " n"]
+    wide: Bool[ndarray, " n"]
+
+    def of(self, which: ndarray) -> Outlines:
+        """Those of some."""
+        return Outlines(self.ellipses.of(which), *(part[which] for part in self[1:]))
+
+    def with_more(self, more: Outlines) -> Outlines:
+        """These, then more."""
+        ellipses = Ellipses(*map(np.concatenate, zip(self.ellipses, more.ellipses, strict=True)))
+        rest = (np.concatenate(pair) for pair in zip(self[1:], more[1:], strict=True))
+        return Outlines(ellipses, *rest)
 
 
 def refined_discs(grey: ndarray, rough: Ellipses) -> Outlines:
@@ -133,13 +163,13 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Outlines:
     smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA)
     angle = 2.0 * np.pi * np.arange(RAY_COUNT) / RAY_COUNT
     rays = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    fitted, roughness = rough, np.full(len(rough.centres), np.inf)
+    fitted, roughness, contrast = rough, *np.full((2, len(rough.centres)), np.inf)
     for _ in range(REFINING_ROUNDS):
         known = np.isfinite(fitted.centres[:, 0])
         centres, axes = fitted.centres[known], fitted.axes[known]
         if not len(centres):
             break
-        radii = _outline(smooth, centres, axes @ rays.T)
+        radii, contrast[known] = _outline(smooth, centres, axes @ rays.T)
         rims = centres[:, None] + radii[..., None] * np.einsum("nij,kj->nki", axes, rays)
         found = fit_ellipses(rims)
         places = np.linalg.solve(
@@ -155,12 +185,34 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Outlines:
         new_centres[which], new_axes[which] = found.centres[good], found.axes[good]
         roughness[which] = off_radii[good]
         fitted = Ellipses(new_centres, new_axes)
-    return Outlines(fitted, roughness)
+    return _fitted_whole(grey, Outlines(fitted, roughness, contrast, np.zeros(len(roughness), dtype=bool)))
 
 
-def _outline(smooth: ndarray, centres: ndarray, arms: Float[ndarray, "n 2 k"]) -> Float[ndarray, "n k"]:
-    """How far along each ray, in radii, grey rises through the middle between inside and outside; NaN where
-    it does not, or where the ray leaves the picture.
+def _fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
+    """The outlines, each fitted to all pixels about it, but for discs hardly wider than the blur; NaN where a
+    sector of one is off, or noise hides where it is.
+    """
+    found = outlines.ellipses
+    which = np.flatnonzero(np.isfinite(found.centres[:, 0]))
+    fit = fit_discs(grey, found.of(which))
+    moved = np.linalg.norm(fit.ellipses.centres - found.centres[which], axis=1)
+    size = np.sqrt(np.abs(np.linalg.det(found.axes[which])))
+    wide = np.abs(np.linalg.eigvalsh(found.axes[which])).min(1, initial=np.inf) > LEAST_BLURS * fit.blur
+    taken = wide & (moved < FARTHEST_RADII * size)
+    off = np.maximum(MOST_SECTOR_RADII * size[:, None], MOST_SECTOR_SPREADS * fit.spread)
+    smooth = ((np.abs(fit.off) < off).all(1) | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
+    centres, axes = found.centres.copy(), found.axes.copy()
+    centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
+    centres[which[~smooth]], axes[which[~smooth]] = np.nan, np.nan
+    outlines.wide[which[taken]] = True
+    return outlines._replace(ellipses=Ellipses(centres, axes))
+
+
+def _outline(
+    smooth: ndarray, centres: ndarray, arms: Float[ndarray, "n 2 k"]
+) -> tuple[Float[ndarray, "n k"], Float[ndarray, " n"]]:
+    """How far along each ray, in radii, grey rises through the middle between inside and outside, NaN where
+    it does not, or where the ray leaves the picture; and each disc's contrast.
     """
     radius = np.linspace(INNER_RADIUS, OUTER_RADIUS, RAY_SAMPLES)
     x, y = (centres[:, i, None, None] + arms[:, i, :, None] * radius for i in (0, 1))
@@ -186,4 +238,5 @@ def _outline(smooth: ndarray, centres: ndarray, arms: Float[ndarray, "n 2 k"]) -
     far_x, far_y = (centres[:, i, None] + arms[:, i] * 1.1 for i in (0, 1))
     in_picture = (far_x > 0) & (far_x < width - 1) & (far_y > 0) & (far_y < height - 1)
     good = rises.any(-1) & in_picture & (outside - inside > LEAST_CONTRAST)
-    return np.where(good, found, np.nan)
+    contrast = np.median(outside - inside, axis=1) / np.maximum(np.median(outside, axis=1), 1.0)
+    return np.where(good, found, np.nan), np.maximum(contrast, LEAST_SHARE)

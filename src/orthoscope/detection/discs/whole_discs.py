@@ -1,0 +1,88 @@
+"""Which discs are whole: as large, as dark, as smooth and where those near them foresee it.
+
+Something that covers a part of a disc leaves an outline that may be an ellipse again, smaller and beside the
+true one; blurred, it only makes the disc fainter. What discs have in common changes evenly over a board:
+size and place are foreseen by a parabola through the nearest twelve; contrast, since several that are covered
+stand together, by one through most of the board's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orthoscope.detection.discs.disc_lattice import FORESEEING_DISCS, foretelling
+from orthoscope.detection.discs.disc_outlines import Outlines
+from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
+from orthoscope.targets.circles import Circles
+
+__all__ = ["are_whole"]
+
+# With no more than so many discs nearby none is foreseen well enough to compare with.
+FEWEST_FORESEEING = 5
+# A disc's outline is at most so many times as rough as is usual, or this rough, radii.
+MOST_ROUGH, SMOOTH_RADII = 3.0, 0.03
+# A disc's radius is at most this share off what those near it foresee, or so many times the usual share.
+MOST_OFF_SIZE, TIMES_OFF_SIZE = 0.1, 5.0
+# A disc's contrast is at most this share off, or so many times the usual share.
+MOST_OFF_CONTRAST, TIMES_OFF_CONTRAST = 0.15, 5.0
+# The parabola of contrasts goes, so many times, through those that are off by less than so many times the
+# usual.
+MOST_ROUNDS, MOST_TIMES_USUAL = 4, 3.0
+# A disc's centre is at most so many of its radii off from where those near it foresee it, or so many times as
+# far as is usual.
+MOST_OFF_PLACE, TIMES_OFF_PLACE = 0.15, 6.0
+# One that is rough, of another size or hardly wider than the blur is off by at most so many times the usual,
+# but within these, pixels.
+SUSPECT_OFF_PX = 0.5, 0.8
+# A disc whose outline is rougher than this, radii, and than so many times the usual, or its radius off by
+# more than this share, may be covered.
+SURELY_SMOOTH, SUSPECT_ROUGH, SURELY_AS_LARGE = 0.015, 2.0, 0.03
+
+
+def are_whole(board: Circles, discs: Outlines, ids: Int[ndarray, " n"]) -> Bool[ndarray, " n"]:
+    """Which discs are like those near them; others are partly covered.
+
+    Args:
+        board: what was photographed.
+        discs: that were found.
+        ids: of these.
+    """
+    if not len(ids):
+        return np.zeros(0, dtype=bool)
+    centres, roughness = discs.ellipses.centres, discs.roughness
+    places, radii = board.neighbour_places()[ids], np.sqrt(np.abs(np.linalg.det(discs.ellipses.axes)))
+    good = roughness < max(MOST_ROUGH * median(roughness), SMOOTH_RADII)
+    known = np.column_stack([centres, np.log(radii)])
+    off = np.zeros((len(ids), 3))
+    for number in range(len(ids)):
+        others = np.flatnonzero(good & (np.arange(len(ids)) != number))
+        apart = np.abs(places[others] - places[number]).sum(-1)
+        nearest = others[np.argsort(apart, kind="stable")[:FORESEEING_DISCS]]
+        if len(nearest) > FEWEST_FORESEEING:
+            weights = foretelling(places[nearest] - places[number])
+            off[number] = (weights @ known[nearest] - known[number]) / max(1.0, np.linalg.norm(weights))
+    off_place = np.hypot(off[:, 0], off[:, 1]) / radii
+    off_size, off_contrast = np.abs(off[:, 2]), _off_parabola(places, np.log(discs.contrast))
+    usual = TIMES_OFF_PLACE * median(off_place)
+    suspect = (
+        ~discs.wide
+        | (roughness > max(SURELY_SMOOTH, SUSPECT_ROUGH * median(roughness)))
+        | (off_size > SURELY_AS_LARGE)
+    )
+    low, high = (px / radii for px in SUSPECT_OFF_PX)
+    good &= off_place < np.where(suspect, np.clip(usual, low, high), max(MOST_OFF_PLACE, usual))
+    good &= off_contrast < max(MOST_OFF_CONTRAST, TIMES_OFF_CONTRAST * median(off_contrast))
+    return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
+
+
+def _off_parabola(places: Int[ndarray, "n 2"], values: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
+    """How far each value is from a parabola through most of them; 0 of few discs."""
+    x, y = ((places - places.mean(0)) / max(np.ptp(places), 1)).T
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+    if len(places) < 2 * terms.shape[1]:
+        return np.zeros(len(places))
+    off, used = np.abs(values - median(values)), np.ones(len(places), dtype=bool)
+    for _ in range(MOST_ROUNDS):
+        used = off <= MOST_TIMES_USUAL * median(off)
+        off = np.abs(values - terms @ np.linalg.lstsq(terms[used], values[used], rcond=None)[0])
+    return off
