@@ -9,10 +9,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 from helpers.scenes import NARROW, photographed
-from orthoscope.fitting.calibration import Uncertainty, residuals_of, rms
+from orthoscope.fitting.calibration import Uncertainty, corners_beyond, residuals_of, rms
 from orthoscope.geometry.arrays import InputError
+from orthoscope.geometry.pose import Pose
 from orthoscope.methods import METHODS, calibrate
 from orthoscope.methods.fccm import fccm
+from orthoscope.models.camera import Camera
+from orthoscope.models.intrinsics import Intrinsics
+from orthoscope.models.lenses.table import Brown
+from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.target import Target
 
 DETECTIONS = photographed(NARROW, 4, noise_px=0.2)
 
@@ -70,6 +76,16 @@ def test_residuals_go_on_beyond_the_lens_s_domain_as_least_squares_does():
     e = np.concatenate(residuals_of(folding, found.camera_from_target, DETECTIONS))
     assert np.isnan(folding.project(found.camera_from_target[0].apply(DETECTIONS.target.points))).any()
     assert np.isfinite(e).all()
+
+
+def test_corners_that_lie_where_the_formula_has_ended_are_counted():
+    """u = r (1 - r^2 / 2) comes back from r = .816."""
+    camera = Camera((640, 480), Intrinsics(500.0, 500.0, 320.0, 240.0), Brown(k1=-0.5))
+    points = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.8, 0.0, 0.0], [0.83, 0.0, 0.0], [0.0, 0.9, 0.0]])
+    view = View("a", np.array([0, 2, 3, 4]), np.full((4, 2), 300.0))
+    detections = Detections(Target("row", points), (640, 480), (view,))
+    front = Pose(np.eye(3), np.array([0.0, 0.0, 1.0]))
+    assert corners_beyond(camera, (front,), points, detections) == 2
 
 
 def test_residuals_of_views_are_in_their_order_and_of_their_corners():

@@ -20,7 +20,16 @@ from orthoscope.models.target_shape import TargetShape
 from orthoscope.targets.detections import Detections
 from orthoscope.targets.target import Target
 
-__all__ = ["Calibration", "Candidate", "Uncertainty", "Variances", "points_of", "residuals_of", "rms"]
+__all__ = [
+    "Calibration",
+    "Candidate",
+    "Uncertainty",
+    "Variances",
+    "corners_beyond",
+    "points_of",
+    "residuals_of",
+    "rms",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,6 +238,19 @@ def residuals_of(
         [view.pixels for view in views]
     )
     return tuple(np.split(apart, np.cumsum([len(each) for each in placed])[:-1]))
+
+
+def corners_beyond(
+    camera: Camera, camera_from_target: Sequence[Pose], points: Float[ndarray, "m 3"], detections: Detections
+) -> int:
+    """How many corners lie where the lens formula has ended before them.
+
+    Args:
+        points: the target's corners as they are, metres.
+    """
+    views = zip(camera_from_target, detections.views, strict=True)
+    placed = np.concatenate([pose.apply(points[view.ids]) for pose, view in views])
+    return int(np.isnan(camera.project(placed)[:, 0]).sum())
 
 
 def rms(residuals: Float[ndarray, "n 2"]) -> float:

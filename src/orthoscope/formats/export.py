@@ -29,6 +29,7 @@ from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.models.lenses.table import lens_name, parse_lens
 from orthoscope.simulation.scene import Scene
 from orthoscope.solve.least_squares import Options
+from orthoscope.targets.detections import Detections
 
 __all__ = ["LIMIT_PX", "Exportable", "Exported", "export", "exportable"]
 
@@ -132,7 +133,7 @@ def export(
         shifted(held.camera, record.pixel_origin),
         poses=_poses(source),
         name=_checked_name(name),
-        trusted=None if made_from is None else _corners(made_from) + record.pixel_origin,
+        trusted=None if made_from is None else _corners(made_from.detections) + record.pixel_origin,
     )
     files = record.write(contents, Path(path))
     for place, content in files.items():
@@ -172,20 +173,21 @@ def exportable(camera: Camera, tool: str, *, made_from: Calibration | None = Non
         assert holding is not None, "nothing is lacking"
         beyond = share_beyond(camera, holding.farthest_deg)
         return Exportable(camera, 0.0, 0.0, where, "", beyond)
-    other, holding = _nearest(camera, made_from, record)
-    rays, wanted = _seen(camera, made_from)
+    seen = made_from and made_from.detections
+    other, holding = _nearest(camera, seen, record)
+    rays, wanted = _seen(camera, seen)
     apart = np.hypot(*(other.project(rays) - wanted).T)
     beyond = share_beyond(other, holding.farthest_deg)
     return Exportable(other, float(apart.mean()), float(apart.max()), where, lacks, beyond)
 
 
-def _nearest(camera: Camera, made_from: Calibration | None, record: Format) -> tuple[Camera, Holding]:
+def _nearest(camera: Camera, seen: Detections | None, record: Format) -> tuple[Camera, Holding]:
     """The camera of the tool whose image of what was seen is nearest to this camera's, in pixels."""
     focal = (*(FOCAL if record.two_focals else ("fx=fy", "cx", "cy")), *(("skew",) if record.skew else ()))
     near: list[_Near] = []
     for lens in record.lenses:
         try:
-            other = _fitted(camera, made_from, lens, focal)
+            other = _fitted(camera, seen, lens, focal)
         except CalibrationError:
             continue
         if np.isfinite(other.apart) and record.holding(other.camera.with_unit_scale().lens):
@@ -213,16 +215,17 @@ class _Near(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _fitted(camera: Camera, made_from: Calibration | None, lens: str, focal: tuple[str, ...]) -> _Near:
+def _fitted(camera: Camera, seen: Detections | None, lens: str, focal: tuple[str, ...]) -> _Near:
     """The camera with this lens that is nearest, but for the last digits; found once for all tools that have
     the lens.
 
     Args:
+        seen: corners by which it is judged; the frame where there are none.
         focal: the parameters of K that move.
     Raises:
         CalibrationError: the lens does not see so far.
     """
-    rays, wanted = _seen(camera, made_from)
+    rays, wanted = _seen(camera, seen)
     frame = camera.lens_frame or camera.intrinsics
     fy, skew = frame.fy if "fy" in focal else frame.fx, frame.skew if "skew" in focal else 0.0
     plain = replace(camera, intrinsics=Intrinsics(frame.fx, fy, frame.cx, frame.cy, skew), lens_frame=None)
@@ -240,15 +243,13 @@ def _exact(near: _Near) -> Camera:
 
 
 @lru_cache(maxsize=2)
-def _seen(
-    camera: Camera, made_from: Calibration | None
-) -> tuple[Float[ndarray, "n 3"], Float[ndarray, "n 2"]]:
-    """Rays by which cameras are compared, and their pixels.
+def _seen(camera: Camera, seen: Detections | None) -> tuple[Float[ndarray, "n 3"], Float[ndarray, "n 2"]]:
+    """Rays by which cameras are compared, and their pixels: of corners, or over the frame.
 
     Raises:
         CalibrationError: the camera sees nothing.
     """
-    rays = camera.unproject(frame_grid(camera.image_size) if made_from is None else _corners(made_from))
+    rays = camera.unproject(frame_grid(camera.image_size) if seen is None else _corners(seen))
     rays = rays[np.isfinite(rays).all(1)]
     if not len(rays):
         raise CalibrationError(
@@ -257,9 +258,9 @@ def _seen(
     return rays, camera.project(rays)
 
 
-def _corners(calibration: Calibration) -> Float[ndarray, "n 2"]:
+def _corners(detections: Detections) -> Float[ndarray, "n 2"]:
     """The pixels of corners that the camera was made from, evenly picked where they are many."""
-    pixels = np.concatenate([view.pixels for view in calibration.detections.views])
+    pixels = np.concatenate([view.pixels for view in detections.views])
     return pixels[:: max(1, len(pixels) // ENOUGH_CORNERS)]
 
 

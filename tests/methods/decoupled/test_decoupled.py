@@ -221,9 +221,9 @@ def test_a_base_whose_fit_was_stopped_on_its_way_is_left_to_those_that_arrived(
     noisy: Detections, found: Calibration, monkeypatch: pytest.MonkeyPatch
 ):
     first = found.settings["base"]
-    monkeypatch.setattr(Candidates, "has_arrived", lambda _, model: model.base != first)
+    monkeypatch.setattr(Candidates, "stands", lambda _, model: model.base != first)
     assert decoupled(noisy).settings["base"] != first
-    monkeypatch.setattr(Candidates, "has_arrived", lambda *_: False)  # then each is as good as the others
+    monkeypatch.setattr(Candidates, "stands", lambda *_: False)  # then each is as good as the others
     assert decoupled(noisy).settings["base"] == first
 
 

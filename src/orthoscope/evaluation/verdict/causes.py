@@ -169,7 +169,7 @@ CAUSES: tuple[Cause, ...] = (
     Cause(
         "lens",
         lambda s: s.beyond > 0,
-        lambda s: Grade.NO,
+        lambda s: Grade.NO if s.beyond > WILD_SHARE * s.corners else Grade.USABLE,
         lambda s: (
             f"the lens formula ends {s.fold:.0f} degrees from the axis, before {s.beyond} of the corners"
         ),

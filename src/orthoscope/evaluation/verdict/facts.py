@@ -14,13 +14,13 @@ from orthoscope.evaluation.reference_fit import ReferenceFit
 from orthoscope.evaluation.suspects import ViewError, precious_among, suspects_among
 from orthoscope.evaluation.verdict.causes import is_misfit
 from orthoscope.evaluation.verdict.situation import Situation, coarse_px
-from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.calibration import Calibration, corners_beyond
 from orthoscope.fitting.unseen.near_copies import near_copies
 from orthoscope.geometry.arrays import median
 from orthoscope.models.lenses.table import lens_name
 from orthoscope.solve.least_squares import Status
 
-__all__ = ["Findings", "corners_beyond", "situation_of"]
+__all__ = ["Findings", "situation_of"]
 
 # With no more than this share of the views left without copies, that they agree says nothing.
 DISTINCT_SHARE = 0.7
@@ -83,7 +83,9 @@ def situation_of(found: Findings) -> Situation:
         corners=detections.corners,
         wild=sum(wild.values()),
         wild_in=tuple(sorted(wild, key=lambda image: -wild[image])),
-        beyond=corners_beyond(calibration),
+        beyond=corners_beyond(
+            calibration.camera, calibration.camera_from_target, calibration.target_points, detections
+        ),
         fold=float(np.degrees(calibration.camera.lens.field_angle)),
         disagree=disagreement.kind,
         differ_px=disagreement.by_px,
@@ -98,14 +100,6 @@ def situation_of(found: Findings) -> Situation:
         if reference
         else (),
     )
-
-
-def corners_beyond(calibration: Calibration) -> int:
-    """How many corners lie where the lens formula has ended before them."""
-    points = calibration.target_points
-    views = zip(calibration.camera_from_target, calibration.detections.views, strict=True)
-    seen = np.concatenate([pose.apply(points[view.ids]) for pose, view in views])
-    return int(np.isnan(calibration.camera.project(seen)[:, 0]).sum())
 
 
 def _formula_of(calibration: Calibration) -> str:

@@ -13,7 +13,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from orthoscope.fitting.calibration import Calibration
+from orthoscope.fitting.calibration import Calibration, corners_beyond
 from orthoscope.fitting.slopes.linearised import Linearised
 from orthoscope.fitting.unseen.leave_one_out import LeaveOneOut, leave_one_out
 from orthoscope.fitting.unseen.near_copies import near_copies
@@ -68,12 +68,16 @@ class Candidates:
             squares = np.full(len(self.detections.views), np.nan)
         return Contender(model.base, model.shape, model.lens, model.fit, squares)
 
-    def has_arrived(self, model: Model) -> bool:
-        """Whether the model's fit ended at a minimum."""
+    def stands(self, model: Model) -> bool:
+        """Whether the model's fit ended at a minimum, its lens formula not before any corner."""
         try:
-            return self.step_one(model.step_one).status == Status.CONVERGED
+            fit = self.step_one(model.step_one)
         except CalibrationError:
             return False
+        points = fit.problem.corners(fit.estimate)
+        return fit.status == Status.CONVERGED and not corners_beyond(
+            fit.estimate.camera, fit.poses, points, self.detections
+        )
 
     def _residuals(self, model: Model) -> Float[ndarray, "m n"]:
         """Of each view by the model without it, as in `LeaveOneOut`.

@@ -194,9 +194,9 @@ def _chosen(
 
     if len(of_base) > 1:
         fitting = [model for model in of_base if _can_be_fitted(candidates, model.base)] or of_base[:1]
-        arrived = _arrived(judge(fitting), candidates, fitting)
-        tried |= zip(fitting, arrived, strict=True)
-        base = fitting[first_as_good(arrived, corners)].base
+        standing = _that_stand(judge(fitting), candidates, fitting)
+        tried |= zip(fitting, standing, strict=True)
+        base = fitting[first_as_good(standing, corners)].base
     else:
         base = left.bases[0]
     models = _ends(base, left)
@@ -211,17 +211,18 @@ def _chosen(
     return model, told
 
 
-def _arrived(
+def _that_stand(
     contenders: Sequence[Contender], candidates: Candidates, models: Sequence[Model]
 ) -> list[Contender]:
     """The contenders; what is foreseen by a fit that was stopped on its way counts for nothing beside those
-    that have arrived: with other roundings it would be elsewhere.
+    that have arrived, since with other roundings it would be elsewhere; so does what is foreseen by a lens
+    whose formula ends before some of the corners.
     """
-    arrived = [candidates.has_arrived(model) for model in models]
+    stand = [candidates.stands(model) for model in models]
     nothing = np.full_like(contenders[0].squares, np.nan)
     return [
-        contender if there or not any(arrived) else replace(contender, squares=nothing)
-        for contender, there in zip(contenders, arrived, strict=True)
+        contender if stands or not any(stand) else replace(contender, squares=nothing)
+        for contender, stands in zip(contenders, stand, strict=True)
     ]
 
 
