@@ -52,6 +52,13 @@ def test_the_richest_is_taken_unless_it_loses_more_than_two_standard_errors_agai
     assert richest_unless_worse(contenders(10.0, losing(0.5), losing(1.0)), CORNERS) == 2
 
 
+def test_a_base_that_others_beat_by_next_to_nothing_is_taken_however_sure_that_is():
+    steady = np.full(VIEWS, 10.0)  # the same in every view, so any difference is sure
+    assert first_as_good(contenders(1.019 * steady, steady), CORNERS) == 0
+    assert first_as_good(contenders(1.021 * steady, steady), CORNERS) == 1
+    assert first_as_good(contenders(losing(1.9), steady), CORNERS) == 0
+
+
 @for_either_rule
 def test_scatter_that_all_share_does_not_count(rule):
     hard = np.random.default_rng(1).gamma(

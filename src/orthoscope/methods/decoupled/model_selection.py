@@ -7,8 +7,8 @@ decide alone.  So models are
 compared by ratios: the mean over views, weighed by their corners, of the logarithm of how many times larger
 the squared error of one is than that of the other, in standard errors of that mean.  Rules:
 
-- `first_as_good`: the first that loses little against the best, and not surely, models coming in order of
-  preference; among base formulas.
+- `first_as_good`: the first that loses next to nothing against the best, or little and not surely, models
+  coming in order of preference; among base formulas.
 - `simplest_as_good`: the first within one standard error of the best, simplest first; among formulas whose
   coefficients nothing holds back (L. Breiman et al., Classification and Regression Trees, 1984, 3.4.3).
 - `richest_unless_worse`: the richest unless another foresees surely better; among models whose weights were
@@ -37,6 +37,8 @@ ABOUT_ERRORS = 1.0
 SURE_ERRORS = 2.0
 # A change of a squared error's logarithm by this is 5 % of an error.
 LITTLE_LOGARITHM = 0.1
+# By this it is 1 % of an error: nothing to prefer a formula of more coefficients for, however sure it is.
+NO_LOGARITHM = 0.02
 # A squared error of a corner that is less, px^2, is no error at all.
 NEGLIGIBLE_SQUARE = 1e-12
 
@@ -68,13 +70,13 @@ def simplest_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " 
 
 
 def first_as_good(contenders: Sequence[Contender], corners: Float[ndarray, " m"]) -> int:
-    """The index of the first contender that loses little against the best, and not surely; contenders come in
-    order of preference.
+    """The index of the first contender that loses next to nothing against the best, or little and not
+    surely; contenders come in order of preference.
 
     Args:
         corners: of each view.
     """
-    return _first_within(contenders, corners, SURE_ERRORS, LITTLE_LOGARITHM)
+    return _first_within(contenders, corners, SURE_ERRORS, LITTLE_LOGARITHM, nothing=NO_LOGARITHM)
 
 
 def richest_unless_worse(contenders: Sequence[Contender], corners: Float[ndarray, " m"]) -> int:
@@ -113,16 +115,20 @@ def judged(
 
 
 def _first_within(
-    contenders: Sequence[Contender], corners: Float[ndarray, " m"], errors: float, share: float
+    contenders: Sequence[Contender],
+    corners: Float[ndarray, " m"],
+    errors: float,
+    share: float,
+    nothing: float = 0.0,
 ) -> int:
     """The first that is the best, or loses no more against it than so many standard errors and such a
-    share.
+    share, or than nothing to speak of.
     """
     able = _able(contenders)
     best = _best(contenders, corners, able)
     for i in able:
         mean, error = _difference(contenders[i], contenders[best], corners)
-        if i == best or (mean <= share and (mean <= errors * error or (error == 0.0 and mean <= 0.0))):
+        if i == best or mean <= nothing or (mean <= share and mean <= errors * error):
             return i
     return 0
 
