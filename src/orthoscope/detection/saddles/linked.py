@@ -60,10 +60,10 @@ def are_linked(
     if not len(pixels):
         return np.zeros(0, dtype=bool)
     low = cells.min(0)
-    labels = np.zeros(tuple(np.ptp(cells, axis=0) + 1), np.uint8)
-    labels[tuple((cells - low).T)] = 1
-    _, labels = cv2.connectedComponents(labels, connectivity=4)
-    mine = labels[tuple((cells - low).T)]
+    column, row = (cells - low).T
+    seen = np.zeros(tuple(np.ptp(cells, axis=0) + 1), np.uint8)
+    seen[column, row] = 1
+    mine = np.asarray(cv2.connectedComponents(seen, connectivity=4)[1])[column, row].astype(int)
     most = mine == np.bincount(mine).argmax()
     kept = most.copy()
     many = np.bincount(mine)[mine] >= MANY_CORNERS

@@ -55,7 +55,7 @@ HARDLY_UNEXPLAINED, HARDLY_UNEXPLAINED_NOISE = 0.005, 0.1
 # Where the arms are known better than this, pixels, and agree, what is left is that squares are not alike.
 SMALL_ARM_SPREAD = 0.2
 # What no arm tells from noise leaves at most so much more than of most, and of the share that is noise.
-MOST_UNEXPLAINED, MOST_UNEXPLAINED_NOISE = 0.03, 0.3
+MOST_UNEXPLAINED, MOST_UNEXPLAINED_NOISE = 0.02, 0.3
 # Where a marker reaches into the window, whose blur is in it, so much more.
 MOST_UNEXPLAINED_BY_MARKS = 0.1
 # An arm of a whole corner would move it by less than this, pixels, or so many standard deviations.

@@ -144,12 +144,13 @@ def _solved(
     normal, right, square = sums[:, :-1, :-1], sums[:, :-1, -1:], sums[:, -1, -1]
     weight = np.maximum(normal[:, :4, :4].sum((1, 2)), 1e-9)  # the four squares together are 1
     added = damping * np.einsum("npp->np", normal) + 1e-6
+    solution, inverse, noise = right, normal, np.zeros(len(sums))
     for _ in range(2):
+        added[:, -2:] += (noise / light**2)[:, None]
         inverse = np.linalg.inv(normal + np.eye(len(damping)) * added[:, None])
         solution = inverse @ right
         left = square - (solution * (2.0 * right - normal @ solution)).sum((1, 2))
         noise = np.maximum(left, 0.0) / weight
-        added[:, -2:] += (noise / light**2)[:, None]
     return solution[:, :, 0], inverse, noise
 
 
