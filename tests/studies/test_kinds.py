@@ -16,5 +16,5 @@ def test_every_kind_is_studied():
 @pytest.mark.parametrize("spec", KINDS)
 def test_a_camera_by_each_kind_is_within_two_standard_errors_of_the_truth(spec):
     error, standard_errors = camera_error(spec, 8)
-    assert error < 0.15  # px
+    assert error < 0.2  # px
     assert standard_errors < 2.0
