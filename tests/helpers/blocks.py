@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.block_system import NormalEquations
 from orthoscope.solve.losses import Loss
 
 __all__ = ["Blocks", "Place"]

@@ -11,7 +11,8 @@ from scipy.optimize import least_squares
 
 from helpers.blocks import Blocks, Place
 from orthoscope.geometry.arrays import InputError
-from orthoscope.solve.least_squares import NormalEquations, Options, Status, shared_covariance, solve
+from orthoscope.solve.block_system import NormalEquations, shared_covariance
+from orthoscope.solve.least_squares import Options, Status, solve
 from orthoscope.solve.losses import Cauchy, Huber, Linear, Loss
 
 SHAPES = {  # k shared, m views, p of each view

@@ -16,7 +16,8 @@ from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.lens import Formula
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
+from orthoscope.solve.block_system import NormalEquations
+from orthoscope.solve.least_squares import Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
 
 __all__ = ["FOCAL", "Pairs", "about_principal_point", "converted", "fit_lens", "fit_pairs"]

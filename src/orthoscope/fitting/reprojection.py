@@ -20,7 +20,7 @@ from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.models.camera import Camera
 from orthoscope.models.lenses.charts import Covector
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.block_system import NormalEquations
 from orthoscope.solve.losses import Loss
 
 __all__ = ["POSE", "Estimate", "Places", "Reprojection"]

@@ -34,7 +34,8 @@ from orthoscope.machine.blas import with_one_thread
 from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
 from orthoscope.methods.own_centre import CENTRE_OPEN, with_own_centre
 from orthoscope.models.lenses.table import parse_lens
-from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
+from orthoscope.solve.block_system import shared_covariance
+from orthoscope.solve.least_squares import Options, Solution, Status, solve
 from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Loss
 from orthoscope.targets.detections import Detections, View
 from orthoscope.targets.target import Target

@@ -21,7 +21,8 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import CENTRE, SCALE
 from orthoscope.models.camera import Camera
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
+from orthoscope.solve.block_system import shared_covariance
+from orthoscope.solve.least_squares import Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
 
 __all__ = ["CENTRE_OPEN", "centre_is_told", "with_own_centre"]

@@ -21,7 +21,8 @@ from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.models.target_shape import polynomials
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
-from orthoscope.solve.least_squares import NormalEquations, Options, solve
+from orthoscope.solve.block_system import NormalEquations
+from orthoscope.solve.least_squares import Options, solve
 from orthoscope.solve.losses import Cauchy, Huber, Linear, Loss
 from orthoscope.targets.target import chessboard
 

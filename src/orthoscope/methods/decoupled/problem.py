@@ -32,7 +32,7 @@ from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.spline import Displacement
 from orthoscope.models.parameters import Parameters
 from orthoscope.models.target_shape import WHOLE, polynomials
-from orthoscope.solve.least_squares import (
+from orthoscope.solve.block_system import (
     NormalEquations,
     blocks_times,
     eliminated,

@@ -26,7 +26,8 @@ from orthoscope.models.lenses.free import FreeLens
 from orthoscope.models.lenses.spline import Displacement, Lattice
 from orthoscope.models.lenses.table import FREE
 from orthoscope.models.target_shape import TargetShape, polynomials, without_similarity
-from orthoscope.solve.least_squares import NormalEquations, Options, Solution, after_step, solve
+from orthoscope.solve.block_system import NormalEquations, after_step
+from orthoscope.solve.least_squares import Options, Solution, solve
 from orthoscope.solve.losses import Huber
 
 __all__ = ["FORMULA", "StepOneFit", "fit_step_one", "polished"]

@@ -37,7 +37,7 @@ from orthoscope.geometry.projective import cross_ratio, cross_ratio_slope
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.methods.mldc.straightened_lines import distances
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.block_system import NormalEquations
 from orthoscope.solve.losses import Loss
 from orthoscope.targets.target import Target
 

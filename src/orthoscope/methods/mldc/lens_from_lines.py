@@ -31,7 +31,8 @@ from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.models.lenses.charts import EQUIDISTANT
 from orthoscope.models.lenses.lens import Formula
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import Options, Solution, shared_covariance, solve
+from orthoscope.solve.block_system import shared_covariance
+from orthoscope.solve.least_squares import Options, Solution, solve
 from orthoscope.solve.losses import Cauchy, Linear, Loss
 from orthoscope.targets.target import Target
 

@@ -31,7 +31,7 @@ from orthoscope.geometry.pose import rotation_from_vector
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.models.camera import Camera
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.block_system import NormalEquations
 from orthoscope.solve.losses import Loss
 
 __all__ = ["LinesOfSight", "Straightness"]

@@ -49,7 +49,8 @@ from orthoscope.methods.mldc.pairs import pairs_of
 from orthoscope.methods.mldc.repeated import Rounds, joint_parameters, repeat
 from orthoscope.methods.mldc.repeated_plain import repeat_plainly
 from orthoscope.methods.own_centre import centre_is_told
-from orthoscope.solve.least_squares import Options, Solution, Status, shared_covariance, solve
+from orthoscope.solve.block_system import shared_covariance
+from orthoscope.solve.least_squares import Options, Solution, Status, solve
 from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Loss
 from orthoscope.targets.detections import Detections
 from orthoscope.version import __version__

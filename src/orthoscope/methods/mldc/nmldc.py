@@ -34,7 +34,8 @@ from orthoscope.methods.mldc.lens_about_centre import parse_centred_lens
 from orthoscope.methods.mldc.lens_from_lines import MEASURES, StraightLens, fit_straight_lens
 from orthoscope.models.camera import WIDEST_ANGLE, Camera
 from orthoscope.models.lenses.table import lens_name
-from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, shared_covariance
+from orthoscope.solve.block_system import NormalEquations, shared_covariance
+from orthoscope.solve.least_squares import Options, Solution, Status
 from orthoscope.solve.losses import LOSSES, USUAL_SCALE, Linear
 from orthoscope.targets.detections import Detections, View
 from orthoscope.version import __version__

@@ -47,7 +47,8 @@ from orthoscope.models.camera import Camera, image_border
 from orthoscope.models.lenses.lens import Lens
 from orthoscope.models.lenses.table import Fet, Pfet
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import NormalEquations, Options, Solution, Status, solve
+from orthoscope.solve.block_system import NormalEquations
+from orthoscope.solve.least_squares import Options, Solution, Status, solve
 from orthoscope.solve.losses import Loss
 
 __all__ = ["Ended", "Rounds", "in_gauge", "joint_parameters", "repeat"]

@@ -24,7 +24,7 @@ from orthoscope.geometry.projective import fitted_lines
 from orthoscope.methods.mldc.lines_in_views import SeenLines
 from orthoscope.models.camera import Camera
 from orthoscope.models.parameters import Parameters
-from orthoscope.solve.least_squares import NormalEquations
+from orthoscope.solve.block_system import NormalEquations
 from orthoscope.solve.losses import Loss
 
 __all__ = ["OwnCamera", "StraightenedLines", "by_lens", "distances"]

@@ -20,7 +20,7 @@ from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods.mldc.lens_about_centre import fit_centred_lens
 from orthoscope.methods.mldc.pairs import pairs_of
 from orthoscope.methods.mldc.repeated import in_gauge
-from orthoscope.solve.least_squares import shared_covariance
+from orthoscope.solve.block_system import shared_covariance
 from orthoscope.targets.detections import Detections, View
 from orthoscope.version import __version__
 
