@@ -124,10 +124,10 @@ class Renderer:
         return np.rint(np.clip(image, 0.0, 255.0) * self._valid).astype(np.uint8)
 
     def _background(self, rng: np.random.Generator | None, behind: ndarray | None) -> Float[ndarray, "h w"]:
-        if behind is None and rng is None:
-            return np.full(self._valid.shape, BACKGROUND_LEVEL, dtype=np.float32)
         if behind is None:
-            return self._surroundings(rng)
+            if rng is not None:
+                return self._surroundings(rng)
+            return np.full(self._valid.shape, BACKGROUND_LEVEL, dtype=np.float32)
         if behind.shape != self._valid.shape:
             raise InputError(
                 f"behind has shape {behind.shape}; expected the picture's {self._valid.shape}: resize it."
