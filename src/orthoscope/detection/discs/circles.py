@@ -14,11 +14,11 @@ from orthoscope.detection.discs.disc_lattice import (
     laid_on,
     numbered,
 )
-from orthoscope.detection.discs.disc_outlines import refined_discs, spots
+from orthoscope.detection.discs.disc_outlines import Outlines, fitted_whole, outlines_near, smoothed, spots
 from orthoscope.detection.discs.whole_discs import are_whole
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.small_copies import resized, to_photograph
-from orthoscope.geometry.arrays import Int, ndarray
+from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.circles import Circles
 
@@ -36,6 +36,8 @@ ENOUGH_DISCS_SHARE = 0.97
 SMALLEST_SIDE = 16
 # A disc is no farther from where it was foreseen than so many of its radii.
 FARTHEST_RADII = 0.8
+# A spot so many of its radii from where a disc was looked for may be another.
+NEW_RADII = 0.5
 
 
 def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
@@ -47,6 +49,7 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
     """
     count = board.columns * board.rows
     best = Sight(np.zeros(0, dtype=int), np.zeros((0, 2)))
+    asked = np.zeros((0, 2))
     several, laid, seen, shapes = False, False, 0, set()
     for side in COPY_SIDES:
         copy = resized(grey, side)
@@ -62,11 +65,16 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
                 discs = Ellipses(found.centres[which], found.axes[which])
                 ids, unsure = laid_on(board, discs, places, copy.shape)
                 several |= unsure
-                if (ids >= 0).sum() >= FEWEST_DISCS:
+                mine = ids >= 0
+                rough = Ellipses(
+                    to_photograph(discs.centres[mine], copy, grey),
+                    discs.axes[mine] * grey.shape[1] / copy.shape[1],
+                )
+                if mine.sum() >= FEWEST_DISCS and _are_new(rough, asked):
                     laid = True
-                    best = max(
-                        best, _outlined(copy, whole, board, discs, ids), key=lambda sight: len(sight.ids)
-                    )
+                    sight, where = _outlined(whole, board, rough, ids[mine])
+                    asked = np.concatenate([asked, where])
+                    best = max(best, sight, key=lambda sight: len(sight.ids))
                 if len(best.ids) >= ENOUGH_DISCS_SHARE * count:
                     return best
     if len(best.ids) >= FEWEST_DISCS:
@@ -78,31 +86,71 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
     return Unseen(f"was not found in it: {seen} discs hang together, the board has {count}")
 
 
+def _are_new(discs: Ellipses, asked: Float[ndarray, "k 2"]) -> bool:
+    """Whether a disc is where none was looked for yet."""
+    apart = np.linalg.norm(discs.centres[:, None] - asked, axis=2).min(1, initial=np.inf)
+    return bool((apart > NEW_RADII * np.sqrt(np.abs(np.linalg.det(discs.axes)))).any())
+
+
 def _outlined(
-    copy: ndarray, grey: ndarray, board: Circles, discs: Ellipses, ids: Int[ndarray, " n"]
-) -> Sight:
-    """Ids and centres from outlines in the photograph, those of discs that were no spots included."""
-    scale = grey.shape[1] / copy.shape[1]
-    mine = ids >= 0
-    rough = Ellipses(to_photograph(discs.centres[mine], copy, grey), discs.axes[mine] * scale)
-    known, fine = ids[mine], refined_discs(grey, rough)
-    unlike = known[:0]
-    for _ in range(board.columns + board.rows):
-        good = np.isfinite(fine.ellipses.centres[:, 0])
-        known, fine = known[good], fine.of(good)
+    grey: ndarray, board: Circles, rough: Ellipses, ids: Int[ndarray, " n"]
+) -> tuple[Sight, Float[ndarray, "k 2"]]:
+    """Ids and centres from outlines in the photograph, those of discs that were no spots included, and where
+    discs were looked for. What is given out was seen whole in the last fit; where it was foreseen, or rays
+    met an outline, only said where to look.
+
+    Args:
+        grey: (h,w) uint8.
+        board: what to look for.
+        rough: spots.
+        ids: of these.
+    """
+    smooth, known, left_out = smoothed(grey), ids, ids[:0]
+    rays, asked = outlines_near(smooth, rough), rough.centres
+    fine, count = rays, 0
+    while True:
+        known, rays, more = _with_next(smooth, board, known, rays, left_out)
+        asked = np.concatenate([asked, more])
+        if len(known) in (0, count):
+            break
+        fine = fitted_whole(grey, rays)
         good = are_whole(board, fine, known)
-        unlike = np.union1d(unlike, known[~good])
-        known, fine = known[good], fine.of(good)
-        if len(known) < FEWEST_DISCS:
-            break
-        more, there = foreseen(board, fine.ellipses, known, grey.shape)
-        added = refined_discs(grey, there)
-        off = np.linalg.norm(added.ellipses.centres - there.centres, axis=1)
-        near = ~np.isin(more, unlike) & (off < FARTHEST_RADII * np.sqrt(np.abs(np.linalg.det(there.axes))))
-        if not near.any():
-            break
-        known, fine = np.concatenate([known, more[near]]), fine.with_more(added.of(near))
-        fine = refined_discs(grey, fine.ellipses)  # which leaves out what is near to another
+        left_out = np.union1d(left_out, known[~good])
+        known, rays, fine, count = known[good], rays.of(good), fine.of(good), int(good.sum())
+    if len(known) < FEWEST_DISCS:
+        return Sight(known[:0], np.zeros((0, 2))), asked
     order = np.argsort(known)
     diameter = diameter_in_steps(fine.ellipses, board.neighbour_places()[known]) * board.nearest
-    return Sight(known[order], fine.ellipses.centres[order], diameter=diameter)
+    return Sight(known[order], fine.ellipses.centres[order], diameter=diameter), asked
+
+
+def _with_next(
+    smooth: ndarray, board: Circles, ids: Int[ndarray, " n"], rays: Outlines, left_out: Int[ndarray, " k"]
+) -> tuple[Int[ndarray, " m"], Outlines, Float[ndarray, "l 2"]]:
+    """Discs that have an outline, and those next to them where these foresee them, and so on; and where discs
+    were looked for.
+
+    Args:
+        smooth: the picture as rays need it.
+        board: what to look for.
+        ids: of the discs.
+        rays: their outlines, NaN where there is none.
+        left_out: ids that are not looked for again.
+    """
+    asked = [np.zeros((0, 2))]
+    while True:
+        seen = np.isfinite(rays.ellipses.centres[:, 0])
+        ids, rays = ids[seen], rays.of(seen)
+        if len(ids) < FEWEST_DISCS:
+            break
+        more, there = foreseen(board, rays.ellipses, ids, smooth.shape)
+        wanted = ~np.isin(more, left_out)
+        more, there = more[wanted], there.of(wanted)
+        asked.append(there.centres)
+        added = outlines_near(smooth, there)
+        off = np.linalg.norm(added.ellipses.centres - there.centres, axis=1)
+        near = off < FARTHEST_RADII * np.sqrt(np.abs(np.linalg.det(there.axes)))
+        if not near.any():
+            break
+        ids, rays = np.concatenate([ids, more[near]]), rays.with_more(added.of(near))
+    return ids, rays, np.concatenate(asked)

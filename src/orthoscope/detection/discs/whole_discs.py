@@ -40,13 +40,18 @@ SURELY_SMOOTH, SUSPECT_ROUGH, SURELY_AS_LARGE = 0.015, 2.0, 0.03
 
 
 def are_whole(board: Circles, discs: Outlines, ids: Int[ndarray, " n"]) -> Bool[ndarray, " n"]:
-    """Which discs are like those near them; others are partly covered.
+    """Which discs have an outline and are like those near them; others are partly covered.
 
     Args:
         board: what was photographed.
         discs: that were found.
         ids: of these.
     """
+    outlined = np.isfinite(discs.ellipses.centres[:, 0])
+    if not outlined.all():
+        whole = np.zeros(len(ids), dtype=bool)
+        whole[outlined] = are_whole(board, discs.of(outlined), ids[outlined])
+        return whole
     if not len(ids):
         return np.zeros(0, dtype=bool)
     centres, roughness = discs.ellipses.centres, discs.roughness
