@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.discs.disc_fit import fit_discs
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.ellipses import Ellipses, fit_ellipses
 
 __all__ = ["Outlines", "fitted_whole", "outlines_near", "smoothed", "spots"]
@@ -64,7 +64,7 @@ LEAST_SHARE = 1e-3
 # An outline's rms about its ellipse is less than this, radii.
 MOST_ROUGHNESS = 0.12
 # A disc that is fitted as a whole has a shorter half axis of at least so many blurs.
-LEAST_BLURS = 1.5
+LEAST_BLURS = 1.1
 # Of a sure centre the standard deviation is less than this, pixels: it is within a pixel then, as good as
 # always.
 WIDEST_SPREAD = 0.2
@@ -134,13 +134,14 @@ class Outlines(NamedTuple):
         ellipses: through them, NaN where there is no whole one.
         roughness: (n,) rms of an outline about its ellipse, in radii.
         contrast: (n,) from inside to outside, as a share of the outside.
-        wide: (n,) whether it is wide enough beside the blur to be fitted whole.
+        doubt: (n,) how far a sector of it may be off unseen, radii; infinite where it was not fitted whole,
+            or is hardly wider than the blur.
     """
 
     ellipses: Ellipses
     roughness: Float[ndarray, " n"]
     contrast: Float[ndarray, " n"]
-    wide: Bool[ndarray, " n"]
+    doubt: Float[ndarray, " n"]
 
     def of(self, which: ndarray) -> Outlines:
         """Those of some."""
@@ -189,7 +190,7 @@ def outlines_near(smooth: ndarray, rough: Ellipses) -> Outlines:
         new_centres[which], new_axes[which] = found.centres[good], found.axes[good]
         roughness[which] = off_radii[good]
         fitted = Ellipses(new_centres, new_axes)
-    return Outlines(fitted, roughness, contrast, np.zeros(len(roughness), dtype=bool))
+    return Outlines(fitted, roughness, contrast, np.full(len(roughness), np.inf))
 
 
 def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
@@ -200,7 +201,7 @@ def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
         grey: (h,w) uint8.
         outlines: as `outlines_near` finds them.
     """
-    found, is_wide = outlines.ellipses, outlines.wide.copy()
+    found, doubt = outlines.ellipses, np.full(len(outlines.doubt), np.inf)
     which = np.flatnonzero(np.isfinite(found.centres[:, 0]))
     fit = fit_discs(grey, found.of(which))
     moved = np.linalg.norm(fit.ellipses.centres - found.centres[which], axis=1)
@@ -215,8 +216,8 @@ def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     reach = np.linalg.norm(axes, axis=2)
     inside = ((centres > reach) & (centres < np.array(grey.shape[::-1]) - 1 - reach)).all(1)
     centres[~inside], axes[~inside] = np.nan, np.nan
-    is_wide[which[taken]] = True
-    return outlines._replace(ellipses=Ellipses(centres, axes), wide=is_wide)
+    doubt[which[taken]] = (off.max(1) / size)[taken]
+    return outlines._replace(ellipses=Ellipses(centres, axes), doubt=doubt)
 
 
 def _outline(

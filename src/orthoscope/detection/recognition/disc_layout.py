@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from orthoscope.detection.discs.disc_lattice import diameter_in_steps, numbered
+from orthoscope.detection.discs.disc_links import diameter_in_steps, numbered
 from orthoscope.detection.discs.disc_outlines import fitted_whole, outlines_near, smoothed, spots
 from orthoscope.detection.small_copies import resized
 from orthoscope.geometry.arrays import Int, ndarray
