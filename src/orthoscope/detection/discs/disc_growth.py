@@ -44,6 +44,8 @@ def with_next(
         wanted = beside(places)
         wanted = wanted if among is None else wanted[is_among(wanted, among)]
         more, there = foreseen(rays.ellipses, places, wanted, smooth.shape)
+        if not len(more):
+            break
         asked.append(there.centres)
         added = outlines_near(smooth, there)
         seen = np.isfinite(added.ellipses.centres[:, 0])

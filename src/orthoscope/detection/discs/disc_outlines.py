@@ -118,9 +118,12 @@ def _elliptic(dark: ndarray) -> Ellipses:
 
 def _covariances(labels: ndarray, fits: ndarray, middles: ndarray) -> Float[ndarray, "n 2 2"]:
     """Of the pixels of the parts that fit, each pixel a square."""
-    row, column = np.nonzero(fits[labels])
-    number = (np.cumsum(fits) - 1)[labels[row, column]]
     count = int(fits.sum())
+    numbers = np.where(fits, np.cumsum(fits) - 1, -1)
+    pixels = np.flatnonzero(labels)
+    number = numbers[labels.ravel()[pixels]]
+    pixels, number = pixels[number >= 0], number[number >= 0]
+    row, column = np.divmod(pixels, labels.shape[1])
     x, y = column - middles[fits][number, 0], row - middles[fits][number, 1]
     sums = [np.bincount(number, weight, count) for weight in (x * x, x * y, x * y, y * y)]
     area = np.bincount(number, minlength=count)
