@@ -41,7 +41,8 @@ STILL_PX, MOST_STEPS = 0.02, 8
 # When it has moved by less than this, pixels, the light of all discs is asked; with it, it has at most so
 # many more steps.
 NEARLY_STILL_PX, LIT_STEPS = 0.1, 4
-# How much the light of single discs differs from that of all is known to no better than this share of its noise.
+# How much the light of single discs differs from that of all is known to no better than this share of its
+# noise.
 LEAST_LIGHT_SHARE = 0.3
 # A step is at most this share of the shorter half axis.
 LARGEST_STEP_SHARE = 0.25
@@ -200,8 +201,8 @@ class _Fit:
     def _step(
         self, here: ndarray, pixels: Pixels, rows: ndarray
     ) -> tuple[Float[ndarray, " n"], Float[ndarray, "n k"], Float[ndarray, "n k"], Float[ndarray, "n 2 k"]]:
-        """One step of these discs: how far each moved, pixels; what it leaves of the picture; and of each pixel
-        by how much it tells where the outline is, and where it is from the middle.
+        """One step of these discs: how far each moved, pixels; what it leaves of the picture; of each pixel
+        by how much it tells where the outline is; and where it is from the middle.
         """
         columns, slope, out = self._columns(here, pixels, rows)
         solution, spread, left = self._solved(here, columns)
