@@ -30,6 +30,16 @@ def test_a_hidden_corner_is_not_leapt_over():
     assert errors_of(shown, sight).max() < 0.1
 
 
+@pytest.mark.parametrize("number", [1064, 3633], ids=["blur", "covered"])
+def test_a_corner_that_blur_or_a_cover_moves_is_not_given_out(number):
+    """A tag's corner in a window no wider than the blur; one cut off by something nearly white."""
+    (shown,) = photographs(1, seed=9, first=number)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) > 25
+    assert errors_of(shown, sight).max() < 0.5
+
+
 @pytest.mark.parametrize(("seed", "number"), [(9, 8963), (10, 5939)])
 def test_a_disc_whose_fit_failed_is_not_given_out(seed, number):
     """Small discs that fell out of the last of several fits were given out without a place."""

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
+from orthoscope.detection.markers.foreseen import are_off
 from orthoscope.detection.markers.markers import Markers, find_markers, homography_of, of_one_board, remark_on
-from orthoscope.detection.saddles.linked import hang_together
+from orthoscope.detection.saddles.linked import are_linked
 from orthoscope.detection.saddles.refine import refined
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import Float, ndarray
@@ -77,7 +78,8 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
         )
     ids, pixels = ids[sure], pixels[sure]
     cells = np.stack([ids % board.grid[0], ids // board.grid[0]], axis=1)
-    linked = hang_together(pixels, cells, board.places()[ids])
+    linked = are_linked(pixels, cells, board.places()[ids])
+    linked[linked] = ~are_off(pixels[linked], board.places()[ids[linked]])
     if linked.sum() < FEWEST_CORNERS:
         return Unseen(f"was not found in it: of its corners only {linked.sum()} are sure")
     ids, pixels = ids[linked], pixels[linked]

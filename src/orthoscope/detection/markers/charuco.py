@@ -14,8 +14,9 @@ import numpy as np
 
 from orthoscope.detection.chessboards.grid import grid_shape
 from orthoscope.detection.chessboards.partial_board import filled
+from orthoscope.detection.markers.foreseen import are_off
 from orthoscope.detection.markers.markers import Markers, find_markers, homography_of, of_one_board, remark_on
-from orthoscope.detection.saddles.linked import hang_together
+from orthoscope.detection.saddles.linked import are_linked
 from orthoscope.detection.saddles.refine import refined
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import Bool, Float, ndarray
@@ -51,7 +52,8 @@ def see_charuco(grey: ndarray, board: Charuco) -> Sight | Unseen:
     grid = _foreseen(markers, board.marker_corners(legacy=legacy), columns, rows)
     corners, good = _grown(grey, grid, board.arm)
     cells = np.argwhere(good)[:, ::-1]
-    good[good] = hang_together(corners[good], cells, cells.astype(float))
+    good[good] = are_linked(corners[good], cells, cells.astype(float))
+    good[good] = ~are_off(corners[good], np.argwhere(good)[:, ::-1].astype(float))
     if good.sum() < FEWEST_CORNERS:
         return Unseen(
             f"was not found in it: {len(markers.numbers)} of its markers were, but no corners between them"

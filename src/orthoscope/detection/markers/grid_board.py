@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from orthoscope.detection.markers.foreseen import are_off
 from orthoscope.detection.markers.marker_fit import fit_markers
 from orthoscope.detection.markers.markers import Markers, find_markers, of_one_board, remark_on
-from orthoscope.detection.saddles.smooth_grid import off_smooth_grid
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import ndarray
 from orthoscope.targets.grid_board import GridBoard
@@ -18,8 +18,6 @@ __all__ = ["see_grid_board"]
 ENOUGH_SHARE = 0.9
 # A marker's corner is at most this share of its side from where OpenCV sees it.
 FARTHEST_SHARE = 0.15
-# Corners are compared with a smooth map of this order through all others.
-MOST_ORDER = 3
 
 
 def see_grid_board(grey: ndarray, board: GridBoard) -> Sight | Unseen:
@@ -47,12 +45,5 @@ def see_grid_board(grey: ndarray, board: GridBoard) -> Sight | Unseen:
     if not good.any():
         return Unseen(f"was not found in it: its {len(numbers)} markers have no sharp sides")
     ids = 4 * numbers[:, None] + np.arange(4)
-    if good.any():  # what covers a marker may bend it, where it cannot be foreseen by the others
-        places = board.points()[ids[good], :2] / (0.5 * (board.marker + board.gap))
-        pixels_of_square = float(np.median(sides)) / modules_of(board.dictionary)
-        sure = np.zeros(int(good.sum()), dtype=bool)
-        off, _, _ = off_smooth_grid(
-            fine[good], places, pixels_of_square, doubtful=sure, poor=False, most_order=MOST_ORDER
-        )
-        good[good] = ~off
+    good[good] = ~are_off(fine[good], board.points()[ids[good], :2])
     return Sight(ids[good], fine[good], remark_on(markers, mine))

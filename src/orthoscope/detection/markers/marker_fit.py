@@ -5,12 +5,13 @@ A marker's corner is no saddle, and blur rounds it; but all edges inside the mar
 Let P(u) be the marker's drawing and H the homography of its four corners as they are known so far. The
 picture is
 
-    I(x) = c + g.x + b M(x),      M(x) = blurred P(H^-1(x + d(x))),    d a polynomial of third order
+    I(x) = c + g.x + (b + h.x) M(x),      M(x) = blurred P(H^-1(x + d(x))),    d a polynomial of third order
 
 d moves, stretches and bends: a lens bends the marker. Gauss-Newton on d's twenty numbers and the blur (what
-blur does is the Laplacian of M), with b, c and g beside them, and with |grad M|: ink that bled, a camera's
-curve and white that is clipped make all that is black larger or smaller. What noise alone would bend is held
-back as far as lenses hardly bend so much. The corner is where x + d(x) is H's corner.
+blur does is the Laplacian of M), with b, c and uneven light, g and h, beside them, and with |grad M|: ink
+that bled, a camera's curve and white that is clipped make all that is black larger or smaller. What noise
+alone would bend is held back as far as lenses hardly bend so much. The corner is where x + d(x) is H's
+corner.
 """
 
 from __future__ import annotations
@@ -47,8 +48,6 @@ MOST_STEPS, STILL_PX = 8, 0.05
 FARTHEST_PX = 0.3
 # Less contrast than this, grey levels, is none.
 LEAST_CONTRAST = 1.0
-# Black, of a negative white, has at most so many times the contrast, by haze or glare.
-MOST_DARK = 3.0
 # A marker with fewer pixels tells nothing.
 FEWEST_PIXELS = 60
 # Of a marker of the picture's own width a lens bends the sides by about this share of it: by terms of second
@@ -73,6 +72,8 @@ ENOUGH_TO_COMPARE, MOST_USUAL_SHARE = 4, 0.004
 LOCAL_MODULES, MOST_LOCALLY_UNEXPLAINED = 1.5, 0.0015
 # Of a good corner the standard deviation is less than this, pixels.
 WIDEST_SPREAD = 0.22
+# With a blur of at least this, pixels, it is told how much of what is left hangs together.
+LEAST_COHERENCE_BLUR = 0.7
 
 
 class FittedMarkers(NamedTuple):
@@ -115,7 +116,7 @@ def fit_markers(
         fine[number] = (fit.corners + 0.5) * shrink - 0.5
         noise_here = max(noise / shrink**2, min(usual, MOST_USUAL_SHARE * signal)) / signal
         good[number] = fit.left_near_corners() < MOST_LOCALLY_UNEXPLAINED + noise_here
-        good[number] &= fit.spread() * shrink < WIDEST_SPREAD
+        good[number] &= fit.spread() * np.sqrt(fit.coherence_near_corners()) * shrink < WIDEST_SPREAD
         good[number] &= fit.unexplained < MOST_UNEXPLAINED + noise_here / (0.25 + noise_here)
     return FittedMarkers(fine, good)
 
@@ -156,7 +157,7 @@ class _Fit:
         self._drawing = _drawing(black, self._drawn_module)
         self._sampled = self._sample_places()
         self._basis_sampled = self._basis(self._sampled[:2])
-        self._moved, self._dark = np.zeros((2, len(POWERS))), 0.0
+        self._moved = np.zeros((2, len(POWERS)))
         share = self._side / max(grey.shape)
         bends = self._side * np.repeat([USUAL_BENDS[0] * share, USUAL_BENDS[1] * share**2], [3, 4])
         self._usual_bends = np.tile(np.concatenate([np.full(STRAIGHT, np.inf), bends]), 2)
@@ -177,31 +178,54 @@ class _Fit:
 
     def left_near_corners(self) -> Float[ndarray, "4"]:
         """The variance that the drawing leaves near each corner, as a share of the square of the contrast."""
-        near = LOCAL_MODULES * self._side / self._squares
+        left = [self._left[near].var() if near.any() else np.inf for near in self._near_corners()]
+        return np.array(left) / self.contrast**2
+
+    def coherence_near_corners(self) -> Float[ndarray, "4"]:
+        """How many times the variance of noise what is left near each corner has once it is blurred; 1 at
+        least.
+
+        Noise of single pixels averages out, and so the spread has it. What something in front of a corner
+        leaves, be it as small, does not: it moves the corner as noise of so many times the variance would.
+        """
+        sigma = max(self.blur, LEAST_COHERENCE_BLUR)
+        left, there = np.zeros((2, *self._picture.shape), np.float32)
+        left.put(self._inside, self._left)
+        there.put(self._inside, 1.0)
+        rim = cv2.BORDER_CONSTANT
+        blurred = cv2.GaussianBlur(left, (0, 0), sigma, borderType=rim).take(self._inside)
+        # the square of a Gaussian is one, narrower: so much of the variance of noise a blur leaves
+        share = cv2.GaussianBlur(there, (0, 0), sigma / np.sqrt(2.0), borderType=rim).take(self._inside)
+        noise = self.noise / (4.0 * np.pi * sigma**2) * share
+        told = [(blurred[near] ** 2).sum() / max(noise[near].sum(), 1e-9) for near in self._near_corners()]
+        return np.maximum(told, 1.0)
+
+    def _near_corners(self) -> Bool[ndarray, "4 k"]:
+        """Which pixels are near each corner."""
         away = np.linalg.norm(self._places - (self.corners - self._low)[:, :, None], axis=1)
-        left = np.array([self._left[row < near].var() if (row < near).any() else np.inf for row in away])
-        return left / self.contrast**2
+        return away < LOCAL_MODULES * self._side / self._squares
 
     def _step(self) -> bool:
         """One step of Gauss-Newton; whether it could be made."""
         model, count = self._drawn(), len(POWERS)
-        columns = np.empty((2 * count + 6, len(self._values)), np.float32)
+        columns = np.empty((2 * count + 8, len(self._values)), np.float32)
         slopes = [
             cv2.Scharr(model, cv2.CV_32F, *way, scale=1.0 / 32.0).take(self._inside)
             for way in ((1, 0), (0, 1))
         ]
         for first, slope in zip((0, count), slopes, strict=True):
             np.multiply(slope, self._basis_inside, out=columns[first : first + count])
-        columns[-6] = np.hypot(*slopes)
-        columns[-5] = cv2.Laplacian(model, cv2.CV_32F, ksize=1).take(self._inside)
+        columns[-8] = np.hypot(*slopes)
+        columns[-7] = cv2.Laplacian(model, cv2.CV_32F, ksize=1).take(self._inside)
         columns[-2], columns[-1] = model.take(self._inside), 1.0
-        np.multiply(self._basis_inside[1:3], columns[-2] + np.float32(self._dark), out=columns[-4:-2])
+        columns[-6:-4] = self._basis_inside[1:3]
+        np.multiply(self._basis_inside[1:3], columns[-2], out=columns[-4:-2])
         normal = (columns @ columns.T).astype(float)
         # what the bend was before counts, too: as a whole it is held to nothing, by as much as there is noise
         held = 1e-7 * np.diag(normal) + 1e-9
         held[: 2 * count] += self.noise / np.maximum(self._usual_bends * abs(self.contrast), 1e-6) ** 2
-        held[-6] += self.noise / max(USUAL_SHIFT * abs(self.contrast), 1e-6) ** 2
-        held[-4:-2] += self.noise / max(USUAL_LIGHT * abs(self.contrast), 1e-6) ** 2
+        held[-8] += self.noise / max(USUAL_SHIFT * abs(self.contrast), 1e-6) ** 2
+        held[-6:-2] += self.noise / max(USUAL_LIGHT * abs(self.contrast), 1e-6) ** 2
         wanted = np.zeros(len(held))
         wanted[: 2 * count] = np.where(
             np.isfinite(self._usual_bends), -self.contrast * self._moved.ravel(), 0.0
@@ -214,11 +238,10 @@ class _Fit:
         self._left = self._values - solution.astype(np.float32) @ columns
         self.noise = float(self._left @ self._left) / max(len(self._left) - len(solution), 1)
         self.unexplained = float(self._left.var() / max(self._values.var(), 1e-9))
-        self._dark = float(np.clip(solution[-1] / self.contrast, -MOST_DARK, MOST_DARK))
         limit = 0.5 * self._side / self._squares
         steps = solution[: 2 * count].reshape(2, count) / self.contrast
         self._moved = self._moved + np.clip(steps, -limit, limit)
-        squared = self.blur**2 + 2.0 * float(np.clip(solution[-5] / self.contrast, -0.5, 0.5))
+        squared = self.blur**2 + 2.0 * float(np.clip(solution[-7] / self.contrast, -0.5, 0.5))
         self.blur = float(np.sqrt(np.clip(squared, LEAST_BLUR**2, MOST_BLUR**2)))
         self._inverse = inverse
         self.corners = self._foreseen()

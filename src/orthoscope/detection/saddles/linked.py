@@ -4,8 +4,7 @@ Where something covers the middle of a board, what lies beyond is foreseen from 
 corner beside it: a true corner with a wrong number. Corners that are linked to most, from one to the next,
 are numbered by counting. Many together are not mistaken for those beside them, since lines would have a step
 in them; one that is apart stays only where those nearest to it foresee it, by a homography, well within a
-step, and is not far from them. At last each is compared with where all others
-foresee it (`smooth_grid.py`).
+step, and is not far from them.
 """
 
 from __future__ import annotations
@@ -13,11 +12,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from orthoscope.detection.chessboards.grid import nearest_neighbour
-from orthoscope.detection.saddles.smooth_grid import SURE_STEP_SHARE, off_smooth_grid
-from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 
-__all__ = ["are_linked", "hang_together"]
+__all__ = ["are_linked"]
 
 # So many corners that are linked to each other stay, though they are apart from most.
 MANY_CORNERS = 6
@@ -27,24 +24,6 @@ FORESEEING_CORNERS = 8
 FARTHEST_STEPS = 2
 # It is off where it is foreseen by less than this share of a step.
 MOST_OFF_SHARE = 0.25
-
-
-def hang_together(
-    pixels: Float[ndarray, "m 2"], cells: Int[ndarray, "m 2"], places: Float[ndarray, "m 2"]
-) -> Bool[ndarray, " m"]:
-    """Which corners are linked, and not off where all linked ones foresee them.
-
-    Args:
-        pixels: the corners.
-        cells: the column and row of each in the lattice, counted.
-        places: where the board has them, in steps to the nearest.
-    """
-    kept = are_linked(pixels, cells, places)
-    if kept.sum() > 2:
-        step = median(nearest_neighbour(pixels[kept], places[kept])) * MOST_OFF_SHARE / SURE_STEP_SHARE
-        none = np.zeros(int(kept.sum()), dtype=bool)
-        kept[kept] = ~off_smooth_grid(pixels[kept], places[kept], step, doubtful=none, poor=False)[0]
-    return kept
 
 
 def are_linked(
