@@ -10,7 +10,8 @@ picture is
 d moves, stretches and bends: a lens bends the marker. Gauss-Newton on d's twenty numbers and the blur (what
 blur does is the Laplacian of M), with b, c and uneven light, g and h, beside them, and with |grad M|: ink
 that bled, a camera's curve and white that is clipped make all that is black larger or smaller. What noise
-alone would bend is held back as far as lenses hardly bend so much. The corner is where x + d(x) is H's corner.
+alone would bend is held back as far as lenses hardly bend so much. The corner is where x + d(x) is H's
+corner.
 """
 
 from __future__ import annotations
