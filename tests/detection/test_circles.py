@@ -9,7 +9,7 @@ import pytest
 from orthoscope.detection.detect import detect
 from orthoscope.detection.discs.circles import see_circles
 from orthoscope.detection.discs.disc_fit import fit_discs
-from orthoscope.detection.discs.disc_outlines import refined_discs
+from orthoscope.detection.discs.disc_outlines import fitted_whole, outlines_near, smoothed
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.ellipses import Ellipses
@@ -78,8 +78,9 @@ def test_an_outline_that_is_not_whole_is_no_disc():
     x, y = np.rint(truth[20]).astype(int)
     covered[y : y + 20, x - 20 : x + 20] = 200
     rough = Ellipses(truth[19:21], np.tile(np.eye(2) * 8.0, (2, 1, 1)))
-    assert np.isfinite(refined_discs(picture, rough).ellipses.centres).all()
-    assert np.isfinite(refined_discs(covered, rough).ellipses.centres[:, 0]).tolist() == [True, False]
+    whole, part = (fitted_whole(one, outlines_near(smoothed(one), rough)) for one in (picture, covered))
+    assert np.isfinite(whole.ellipses.centres).all()
+    assert np.isfinite(part.ellipses.centres[:, 0]).tolist() == [True, False]
 
 
 def test_discs_that_are_not_as_wide_as_described_are_told_of():

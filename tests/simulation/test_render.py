@@ -272,3 +272,16 @@ def test_the_demos_sheet_with_its_margin_fits_a4():
     )  # a square and a square of margin on either side
     assert width <= 0.297
     assert height <= 0.210
+
+
+def test_what_is_behind_is_seen_around_the_target_alone():
+    target, renderer = chessboard(5, 4, 0.03), Renderer(CAMERAS["normal"], **BARE)
+    (pose,) = random_views(renderer.camera, target, 1, rng=np.random.default_rng(3))
+    plain = renderer.photograph(target, pose)
+    placed = renderer.photograph_of([(target, pose)], behind=np.full((240, 320), 47.0))
+    around, board = plain == BACKGROUND_LEVEL, (plain == BLACK_LEVEL) | (plain == WHITE_LEVEL)
+    assert (placed[around] == 47).mean() > 0.995  # an edge within the board may be as grey
+    assert_allclose(placed[board].astype(int), plain[board], atol=1)
+    assert min(around.mean(), board.mean()) > 0.05
+    with pytest.raises(InputError, match="resize it"):
+        renderer.photograph_of([(target, pose)], behind=np.zeros((240, 319)))

@@ -2,10 +2,9 @@
 
 A camera's lens does not turn with the telephone, so a tag that says how it was held turns nothing. OpenCV
 decodes; before version 5 it says nothing of a JPEG that is cut off (it comes back half grey), so the end that
-JPEG and PNG must have is looked for first, chunk by
-chunk: thumbnails have ends of their own, and telephones put whole films after the picture. 16-bit pictures
-are brought to 8 bits by the fewest bits that hold their brightest value: cameras fill 10, 12 or 14 bits of
-the 16, and dividing by 257 would turn those nearly black.
+JPEG and PNG must have is looked for first, chunk by chunk: thumbnails have ends of their own, and telephones
+put whole films after the picture. 16-bit pictures are brought to 8 bits by the fewest bits that hold their
+brightest value: cameras fill 10, 12 or 14 bits of the 16, and dividing by 257 would turn those nearly black.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """mrcal's .cameramodel: a Python dictionary of plain values, with comments.
 
 LENSMODEL_OPENCV4, 5, 8 and 12 are OpenCV's, LENSMODEL_PINHOLE has no coefficients, nor has
-LENSMODEL_STEREOGRAPHIC, 2 tan(theta / 2); a centre as ours. The
-camera stands in the reference frame (no extrinsics). valid_intrinsics_region is the hull of the corners that
-the camera was made from: beyond it the camera is not known.
+LENSMODEL_STEREOGRAPHIC, 2 tan(theta / 2); a centre as ours. The camera stands in the reference frame (no
+extrinsics). valid_intrinsics_region is the hull of the corners that the camera was made from: beyond it the
+camera is not known.
 """
 
 from __future__ import annotations

@@ -94,21 +94,22 @@ class Renderer:
         return self.photograph_of([(target, camera_from_target)], rng=rng)
 
     def photograph_of(
-        self, stands: Sequence[tuple[Target, Pose]], *, rng: np.random.Generator | None = None
+        self,
+        stands: Sequence[tuple[Target, Pose]],
+        *,
+        rng: np.random.Generator | None = None,
+        behind: ndarray | None = None,
     ) -> ndarray:
         """One photograph of several targets, (h,w) uint8.
 
         Args:
             stands: each target and camera_from_target, the one in front last.
             rng: as in `photograph`.
+            behind: what is seen around the targets, (h,w) grey levels, instead of a background of its own.
         Raises:
-            InputError: a target cannot be drawn.
+            InputError: a target cannot be drawn; `behind` has another size.
         """
-        image = (
-            np.full(self._valid.shape, BACKGROUND_LEVEL, dtype=np.float32)
-            if rng is None
-            else self._surroundings(rng)
-        )
+        image = self._background(rng, behind)
         for target, camera_from_target in stands:
             sheet = Sheet(target.drawing(), black=BLACK_LEVEL, white=WHITE_LEVEL)
             plane_from_ray = _plane_from_ray(camera_from_target)
@@ -121,6 +122,17 @@ class Renderer:
         if rng is not None and self.noise > 0:
             image += self._noise(image, rng)
         return np.rint(np.clip(image, 0.0, 255.0) * self._valid).astype(np.uint8)
+
+    def _background(self, rng: np.random.Generator | None, behind: ndarray | None) -> Float[ndarray, "h w"]:
+        if behind is None:
+            if rng is not None:
+                return self._surroundings(rng)
+            return np.full(self._valid.shape, BACKGROUND_LEVEL, dtype=np.float32)
+        if behind.shape != self._valid.shape:
+            raise InputError(
+                f"behind has shape {behind.shape}; expected the picture's {self._valid.shape}: resize it."
+            )
+        return behind.astype(np.float32)
 
     @cached_property
     def _rays(self) -> Float[ndarray, "3 h w"]:

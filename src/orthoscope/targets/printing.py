@@ -1,10 +1,8 @@
-"""A target on a sheet of paper: its drawing in true size, a ruler to check that, and its description beside
-it.
+"""A target on paper: its drawing in true size, a ruler to check that, and its description beside it.
 
 A page is rectangles, discs and lines of text in millimetres from the paper's top left. Each format writes the
-same
-page: PDF and SVG as vectors (1 pt = 25.4/72 mm), DXF for laser and plotter (R12, y upwards), PNG in dots.
-What is printed differs from the drawing by the printer's scale only, which the ruler shows.
+same page: PDF and SVG as vectors (1 pt = 25.4/72 mm), DXF for laser and plotter (R12, y upwards), PNG in
+dots. What is printed differs from the drawing by the printer's scale only, which the ruler shows.
 """
 
 from __future__ import annotations

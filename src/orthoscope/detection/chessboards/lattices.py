@@ -3,8 +3,7 @@
 From a corner its edges run to its four neighbours, and since squares are bright and dark by turns, a
 neighbour's bright and dark squares are the other way round. The nearest corner along an edge of which both is
 true is a neighbour if the other one says the same of it; what hangs together by such links is a lattice.
-Chance makes
-links too, rarely many: noise and texture give lattices of a few corners.
+Chance makes links too, rarely many: noise and texture give lattices of a few corners.
 """
 
 from __future__ import annotations

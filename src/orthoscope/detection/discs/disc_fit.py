@@ -38,10 +38,10 @@ USUAL_RADIUS = 24.0
 STILL_PX, MOST_STEPS = 0.02, 8
 # With the light of all discs it has at most so many more.
 LIT_STEPS = 2
-# How light changes over the picture is a polynomial of this order, of so many discs at least; fewer do not
-# tell.
-LIGHT_ORDERS = (3, 36), (2, 20), (1, 12), (0, 6)
-FEWEST_LIT = LIGHT_ORDERS[-1][1]
+# How light and outlines change over the picture is a polynomial of this order, of so many discs at least;
+# fewer do not tell.
+EVEN_ORDERS = (3, 36), (2, 20), (1, 12), (0, 6)
+FEWEST_EVEN = EVEN_ORDERS[-1][1]
 # How much light differs from that is known to no better than this share of its noise.
 LEAST_LIGHT_SHARE = 0.3
 # A step is at most this share of the shorter half axis.
@@ -60,6 +60,10 @@ BLUR_DISCS, BLUR_STEPS = 4, 3
 LIKE_DISCS = 4
 # Blur and contrast of a disc differ from those of the larger ones by about this share.
 USUAL_SPREAD = 0.15
+# A disc's half axes differ from what all outlines foresee by about this share.
+SHAPE_SPREAD = 0.15
+# Half the step from inside to outside is at least so many grey levels.
+LEAST_HALF_STEP = 1.0
 # Pixels that may take part are sought up to so many times as far from the outline as that blur reaches.
 SPARE_REACH = 1.5
 # Nearer to another disc than this, pixels, a pixel is not asked, where the blur is not known yet or wide.
@@ -132,7 +136,8 @@ class _Fit:
         self.half = np.abs(np.linalg.eigvalsh(axes)).min(1)
         self.blur = np.minimum(np.full(count, FIRST_BLUR), self._most_blur())
         self.relief, self.noise, self.centre_spread = np.zeros((3, count))
-        self.level = np.ones(count)
+        self.level, self.step = np.ones((2, count))
+        self.shape = _even_shapes(centres, axes)
         self.usual_blur, self.usual_relief, self.hold = FIRST_BLUR, 0.0, 0.0
         self.light, self.light_spread = np.zeros((count, 2)), np.inf
         self.seen_light, self.seen_light_spread = np.zeros((2, count, 2))
@@ -167,7 +172,7 @@ class _Fit:
         """
         self.relief[:] = self.usual_relief
         self._settle(self.batches, MOST_STEPS)
-        if len(self.centres) >= FEWEST_LIT:
+        if len(self.centres) >= FEWEST_EVEN:
             self._share_light()
             self._hold_to(self.by_size[len(self.by_size) // 2 :])
             self._settle(self.batches, LIT_STEPS)
@@ -185,15 +190,7 @@ class _Fit:
         """Uneven light that changes evenly over the picture, through that of all discs; and how much theirs
         differs from it beyond noise.
         """
-        count = len(self.centres)
-        x, y = ((self.centres - self.centres.mean(0)) / np.ptp(self.centres, axis=0).max()).T
-        order = next(order for order, fewest in LIGHT_ORDERS if count >= fewest)
-        places = np.stack([x**i * y**j for i in range(order + 1) for j in range(order + 1 - i)], axis=1)
-        good = np.ones(count, dtype=bool)
-        for _ in range(2):
-            self.light = places @ np.linalg.lstsq(places[good], self.seen_light[good], rcond=None)[0]
-            off = np.hypot(*(self.seen_light - self.light).T)
-            good = off <= 3.0 * median(off)
+        self.light = _even(self.centres, self.seen_light)
         noise = median(self.seen_light_spread.ravel())
         scatter = median(np.abs(self.seen_light - self.light).ravel()) / 0.6745
         self.light_spread = float(np.sqrt(max(scatter**2 - noise**2, (LEAST_LIGHT_SHARE * noise) ** 2)))
@@ -202,18 +199,18 @@ class _Fit:
         """One step of these discs; how far each moved, pixels."""
         columns, *_ = self._columns(here, pixels, rows)
         solution, spread = self._solved(here, columns)
-        half_step = np.where(np.abs(solution[:, 6]) < 1e-3, 1e-3, solution[:, 6])
+        step = self.step[here]
         self.level[here] = level = np.maximum(pixels.level[rows] + solution[:, 7], 1.0)
         self.seen_light[here], self.seen_light_spread[here] = (
             each[:, 8:] / level[:, None] for each in (solution, spread)
         )
-        self.relief[here] = np.clip(half_step / level, -1.0, 1.0)
-        self.centre_spread[here] = spread[:, :2].max(1) / np.abs(half_step) * self.blur[here]
+        self.relief[here] = np.clip(solution[:, 6] / level, -1.0, 1.0)
+        self.centre_spread[here] = spread[:, :2].max(1) / step * self.blur[here]
         limit = LARGEST_STEP_SHARE * self.half[here, None]
-        moved = np.clip(solution[:, :5] / half_step[:, None] * self.blur[here, None], -limit, limit)
+        moved = np.clip(solution[:, :5] / step[:, None] * self.blur[here, None], -limit, limit)
         self.centres[here] += moved[:, :2]
         self.axes[here] += moved[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
-        change = np.clip(solution[:, 5] / half_step, -0.5, 0.5)
+        change = np.clip(solution[:, 5] / step, -0.5, 0.5)
         self.blur[here] = np.clip(self.blur[here] * np.exp(-change), LEAST_BLUR, self._most_blur()[here])
         return np.abs(moved).max(1)
 
@@ -225,6 +222,8 @@ class _Fit:
         """
         sums = (columns[:, :-1] @ columns.transpose(0, 2, 1)).astype(float)
         normal, right = sums[:, :, :-1], sums[:, :, -1]
+        alone = np.linalg.solve(normal[:, 6:, 6:] + 1e-6 * np.eye(4), right[:, 6:, None])[:, 0, 0]
+        step = self.step[here] = np.maximum(np.abs(alone), LEAST_HALF_STEP)
         held = self.noise[here, None] / np.maximum(self.light_spread * self.level[here, None], 1e-9) ** 2
         damping = DAMPING * np.einsum("npp->np", normal) + 1e-6
         usual = self.usual_relief * self.level[here]
@@ -232,6 +231,10 @@ class _Fit:
         damping[:, 5:7] += like[:, None]
         right[:, 5] += like * usual * np.log(self.blur[here] / self.usual_blur)
         right[:, 6] += like * usual
+        per_px = step / self.blur[here]
+        shaped = self.noise[here] / (per_px * SHAPE_SPREAD * self.half[here]) ** 2
+        damping[:, 2:5] += shaped[:, None]
+        right[:, 2:5] += (shaped * per_px)[:, None] * _three(self.shape[here] - self.axes[here])
         damping[:, 8:] += held
         right[:, 8:] += held * self.light[here] * self.level[here, None]
         inverse = np.linalg.inv(normal + np.eye(10) * damping[:, None])
@@ -255,7 +258,7 @@ class _Fit:
                 np.bincount(number, each.ravel(), SECTORS * len(some)).reshape(-1, SECTORS)
                 for each in (left * slope, slope * slope)
             )
-            scale = self.blur[some, None] / np.where(np.abs(solution[:, 6:7]) < 1e-3, 1e-3, solution[:, 6:7])
+            scale = self.blur[some, None] / np.maximum(np.abs(solution[:, 6:7]), LEAST_HALF_STEP)
             off[some] = -scale * total / np.maximum(square, 1e-9)
             spread[some] = np.abs(scale) * np.sqrt(self.noise[some, None] / np.maximum(square, 1e-9))
         return off, spread
@@ -289,6 +292,36 @@ class _Fit:
             axis=1,
         )
         return columns, slope, u, v
+
+
+def _three(matrices: Float[ndarray, "n 2 2"]) -> Float[ndarray, "n 3"]:
+    """The numbers of symmetric matrices."""
+    return matrices[:, [0, 0, 1], [0, 1, 1]]
+
+
+def _even(places: Float[ndarray, "n 2"], values: Float[ndarray, "n k"]) -> Float[ndarray, "n k"]:
+    """Values that change evenly over the picture, through most of these; of few discs these."""
+    count = len(places)
+    if count < FEWEST_EVEN:
+        return values
+    x, y = ((places - places.mean(0)) / np.ptp(places, axis=0).max()).T
+    order = next(order for order, fewest in EVEN_ORDERS if count >= fewest)
+    terms = np.stack([x**i * y**j for i in range(order + 1) for j in range(order + 1 - i)], axis=1)
+    good, even = np.ones(count, dtype=bool), values
+    for _ in range(2):
+        even = terms @ np.linalg.lstsq(terms[good], values[good], rcond=None)[0]
+        off = np.linalg.norm(values - even, axis=1)
+        good = off <= 3.0 * median(off)
+    return even
+
+
+def _even_shapes(centres: Float[ndarray, "n 2"], axes: Float[ndarray, "n 2 2"]) -> Float[ndarray, "n 2 2"]:
+    """The outline of each disc as all foresee it: logarithms change evenly where a board is far and near."""
+    values, turns = np.linalg.eigh(axes)
+    logarithms = np.einsum("nij,nj,nkj->nik", turns, np.log(values), turns)
+    even = _even(centres, _three(logarithms))
+    values, turns = np.linalg.eigh(even[:, [0, 1, 1, 2]].reshape(-1, 2, 2))
+    return np.einsum("nij,nj,nkj->nik", turns, np.exp(values), turns)
 
 
 def _left(columns: Float[ndarray, "n 11 k"], solution: Float[ndarray, "n 10"]) -> Float[ndarray, "n k"]:

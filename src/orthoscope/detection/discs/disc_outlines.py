@@ -19,10 +19,10 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.discs.disc_fit import fit_discs
-from orthoscope.geometry.arrays import Bool, Float, ndarray
+from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.geometry.ellipses import Ellipses, fit_ellipses
 
-__all__ = ["Outlines", "refined_discs", "spots"]
+__all__ = ["Outlines", "fitted_whole", "outlines_near", "smoothed", "spots"]
 
 # Thresholds are taken over windows of these shares of the longer side.
 WINDOW_SHARES = (0.12, 0.04, 0.3)
@@ -64,7 +64,7 @@ LEAST_SHARE = 1e-3
 # An outline's rms about its ellipse is less than this, radii.
 MOST_ROUGHNESS = 0.12
 # A disc that is fitted as a whole has a shorter half axis of at least so many blurs.
-LEAST_BLURS = 1.5
+LEAST_BLURS = 1.1
 # Of a sure centre the standard deviation is less than this, pixels: it is within a pixel then, as good as
 # always.
 WIDEST_SPREAD = 0.2
@@ -134,13 +134,14 @@ class Outlines(NamedTuple):
         ellipses: through them, NaN where there is no whole one.
         roughness: (n,) rms of an outline about its ellipse, in radii.
         contrast: (n,) from inside to outside, as a share of the outside.
-        wide: (n,) whether it is wide enough beside the blur to be fitted whole.
+        doubt: (n,) how far a sector of it may be off unseen, radii; infinite where it was not fitted whole,
+            or is hardly wider than the blur.
     """
 
     ellipses: Ellipses
     roughness: Float[ndarray, " n"]
     contrast: Float[ndarray, " n"]
-    wide: Bool[ndarray, " n"]
+    doubt: Float[ndarray, " n"]
 
     def of(self, which: ndarray) -> Outlines:
         """Those of some."""
@@ -153,14 +154,18 @@ class Outlines(NamedTuple):
         return Outlines(ellipses, *rest)
 
 
-def refined_discs(grey: ndarray, rough: Ellipses) -> Outlines:
-    """The outlines of discs that are dark.
+def smoothed(grey: ndarray) -> ndarray:
+    """A picture as `outlines_near` takes it, float32; grey: (h,w) uint8."""
+    return cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA).astype(np.float32)
+
+
+def outlines_near(smooth: ndarray, rough: Ellipses) -> Outlines:
+    """The outlines of discs that are dark, by rays.
 
     Args:
-        grey: (h,w) uint8.
+        smooth: (h,w), as `smoothed` makes it.
         rough: ellipses that are right to a quarter of their size.
     """
-    smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA)
     angle = 2.0 * np.pi * np.arange(RAY_COUNT) / RAY_COUNT
     rays = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     fitted, roughness, contrast = rough, *np.full((2, len(rough.centres)), np.inf)
@@ -185,14 +190,18 @@ def refined_discs(grey: ndarray, rough: Ellipses) -> Outlines:
         new_centres[which], new_axes[which] = found.centres[good], found.axes[good]
         roughness[which] = off_radii[good]
         fitted = Ellipses(new_centres, new_axes)
-    return _fitted_whole(grey, Outlines(fitted, roughness, contrast, np.zeros(len(roughness), dtype=bool)))
+    return Outlines(fitted, roughness, contrast, np.full(len(roughness), np.inf))
 
 
-def _fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
-    """The outlines, each fitted to all pixels about it, but for discs hardly wider than the blur; NaN where a
-    sector of one is off, or noise hides where it is.
+def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
+    """Outlines by rays, each fitted to all pixels about it, but for discs hardly wider than the blur; NaN
+    where one is not whole in the picture, a sector of it is off, or noise hides where it is.
+
+    Args:
+        grey: (h,w) uint8.
+        outlines: as `outlines_near` finds them.
     """
-    found = outlines.ellipses
+    found, doubt = outlines.ellipses, np.full(len(outlines.doubt), np.inf)
     which = np.flatnonzero(np.isfinite(found.centres[:, 0]))
     fit = fit_discs(grey, found.of(which))
     moved = np.linalg.norm(fit.ellipses.centres - found.centres[which], axis=1)
@@ -204,8 +213,11 @@ def _fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     centres, axes = found.centres.copy(), found.axes.copy()
     centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
     centres[which[~smooth]], axes[which[~smooth]] = np.nan, np.nan
-    outlines.wide[which[taken]] = True
-    return outlines._replace(ellipses=Ellipses(centres, axes))
+    reach = np.linalg.norm(axes, axis=2)
+    inside = ((centres > reach) & (centres < np.array(grey.shape[::-1]) - 1 - reach)).all(1)
+    centres[~inside], axes[~inside] = np.nan, np.nan
+    doubt[which[taken]] = (off.max(1) / size)[taken]
+    return outlines._replace(ellipses=Ellipses(centres, axes), doubt=doubt)
 
 
 def _outline(
@@ -218,7 +230,7 @@ def _outline(
     x, y = (centres[:, i, None, None] + arms[:, i, :, None] * radius for i in (0, 1))
     shape = (-1, RAY_COUNT * RAY_SAMPLES)
     grey = cv2.remap(
-        smooth.astype(np.float32),
+        smooth,
         x.reshape(shape).astype(np.float32),
         y.reshape(shape).astype(np.float32),
         cv2.INTER_LINEAR,

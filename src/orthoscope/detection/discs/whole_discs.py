@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from orthoscope.detection.discs.disc_lattice import FORESEEING_DISCS, foretelling
+from orthoscope.detection.discs.disc_foresight import FORESEEING_DISCS, foretelling
 from orthoscope.detection.discs.disc_outlines import Outlines
 from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
-from orthoscope.targets.circles import Circles
 
 __all__ = ["are_whole"]
 
@@ -34,28 +33,35 @@ MOST_OFF_PLACE, TIMES_OFF_PLACE = 0.15, 6.0
 # One that is rough, of another size or hardly wider than the blur is off by at most so many times the usual,
 # but within these, pixels.
 SUSPECT_OFF_PX = 0.5, 0.8
+# Where no sector of an outline can be off by so much unseen, radii, it is all of a disc, and within so many
+# radii of where others foresee it, which a lens's curve makes uncertain, it is the board's.
+LEAST_DOUBT, SURELY_NEAR = 0.05, 1.0
 # A disc whose outline is rougher than this, radii, and than so many times the usual, or its radius off by
 # more than this share, may be covered.
 SURELY_SMOOTH, SUSPECT_ROUGH, SURELY_AS_LARGE = 0.015, 2.0, 0.03
 
 
-def are_whole(board: Circles, discs: Outlines, ids: Int[ndarray, " n"]) -> Bool[ndarray, " n"]:
-    """Which discs are like those near them; others are partly covered.
+def are_whole(discs: Outlines, places: Int[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
+    """Which discs have an outline and are like those near them; others are partly covered.
 
     Args:
-        board: what was photographed.
         discs: that were found.
-        ids: of these.
+        places: of these in the lattice.
     """
-    if not len(ids):
+    outlined = np.isfinite(discs.ellipses.centres[:, 0])
+    if not outlined.all():
+        whole = np.zeros(len(places), dtype=bool)
+        whole[outlined] = are_whole(discs.of(outlined), places[outlined])
+        return whole
+    if not len(places):
         return np.zeros(0, dtype=bool)
     centres, roughness = discs.ellipses.centres, discs.roughness
-    places, radii = board.neighbour_places()[ids], np.sqrt(np.abs(np.linalg.det(discs.ellipses.axes)))
+    radii = np.sqrt(np.abs(np.linalg.det(discs.ellipses.axes)))
     good = roughness < max(MOST_ROUGH * median(roughness), SMOOTH_RADII)
     known = np.column_stack([centres, np.log(radii)])
-    off = np.zeros((len(ids), 3))
-    for number in range(len(ids)):
-        others = np.flatnonzero(good & (np.arange(len(ids)) != number))
+    off = np.zeros((len(places), 3))
+    for number in range(len(places)):
+        others = np.flatnonzero(good & (np.arange(len(places)) != number))
         apart = np.abs(places[others] - places[number]).sum(-1)
         nearest = others[np.argsort(apart, kind="stable")[:FORESEEING_DISCS]]
         if len(nearest) > FEWEST_FORESEEING:
@@ -65,12 +71,13 @@ def are_whole(board: Circles, discs: Outlines, ids: Int[ndarray, " n"]) -> Bool[
     off_size, off_contrast = np.abs(off[:, 2]), _off_parabola(places, np.log(discs.contrast))
     usual = TIMES_OFF_PLACE * median(off_place)
     suspect = (
-        ~discs.wide
+        np.isinf(discs.doubt)
         | (roughness > max(SURELY_SMOOTH, SUSPECT_ROUGH * median(roughness)))
         | (off_size > SURELY_AS_LARGE)
     )
     low, high = (px / radii for px in SUSPECT_OFF_PX)
-    good &= off_place < np.where(suspect, np.clip(usual, low, high), max(MOST_OFF_PLACE, usual))
+    farthest = np.where(suspect, np.clip(usual, low, high), max(MOST_OFF_PLACE, usual))
+    good &= off_place < np.where(discs.doubt < LEAST_DOUBT, SURELY_NEAR, farthest)
     good &= off_contrast < max(MOST_OFF_CONTRAST, TIMES_OFF_CONTRAST * median(off_contrast))
     return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from orthoscope.detection.discs.disc_lattice import diameter_in_steps, numbered
-from orthoscope.detection.discs.disc_outlines import refined_discs, spots
+from orthoscope.detection.discs.disc_links import diameter_in_steps, numbered
+from orthoscope.detection.discs.disc_outlines import fitted_whole, outlines_near, smoothed, spots
 from orthoscope.detection.small_copies import resized
 from orthoscope.geometry.arrays import Int, ndarray
 from orthoscope.geometry.ellipses import Ellipses
@@ -39,7 +39,10 @@ def disc_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
                 which, places = numbered(found)
                 layout = _layout(places) if len(which) >= FEWEST_DISCS else None
                 if layout and len(which) > best[0]:
-                    discs = refined_discs(picture, Ellipses(found.centres[which], found.axes[which])).ellipses
+                    discs = fitted_whole(
+                        picture,
+                        outlines_near(smoothed(picture), Ellipses(found.centres[which], found.axes[which])),
+                    ).ellipses
                     best = len(which), layout, diameter_in_steps(discs, places)
             if best[0]:
                 seen[best[1]] += 1

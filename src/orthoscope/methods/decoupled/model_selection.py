@@ -1,11 +1,10 @@
 """Which of several models to take, by photographs that none of them has seen.
 
 All models meet the same views, so what counts is the difference from view to view, not each one's own
-scatter.  Views differ by more than
-models do: one at the image's rim, foreseen by no other, is off by fifty times the others' error, and would
-decide alone.  So models are
-compared by ratios: the mean over views, weighed by their corners, of the logarithm of how many times larger
-the squared error of one is than that of the other, in standard errors of that mean.  Rules:
+scatter. Views differ by more than models do: one at the image's rim, foreseen by no other, is off by fifty
+times the others' error, and would decide alone. So models are compared by ratios: the mean over views,
+weighed by their corners, of the logarithm of how many times larger the squared error of one is than that of
+the other, in standard errors of that mean. Rules:
 
 - `first_as_good`: the first that loses next to nothing against the best, or little and not surely, models
   coming in order of preference; among base formulas.

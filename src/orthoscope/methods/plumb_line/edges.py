@@ -1,10 +1,9 @@
 """Straight-looking edges of a photograph, to a part of a pixel.
 
-OpenCV's line segment detector says where edges run (R. Grompone von Gioi and others, LSD, PAMI 32(4),
-2010); a
-bent one comes as several pieces. Along each piece the brightness across it is sampled, and the edge is where
-that changes fastest: the vertex of the parabola through the slope's peak and its neighbours. Pieces that go
-on in each other are joined to one edge, across gaps and whichever side is the darker: so a row of a
+OpenCV's line segment detector says where edges run (R. Grompone von Gioi and others, LSD, PAMI 32(4), 2010);
+a bent one comes as several pieces. Along each piece the brightness across it is sampled, and the edge is
+where that changes fastest: the vertex of the parabola through the slope's peak and its neighbours. Pieces
+that go on in each other are joined to one edge, across gaps and whichever side is the darker: so a row of a
 chessboard, whose edges stop at every corner, is one line.
 """
 
