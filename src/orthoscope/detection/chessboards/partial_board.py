@@ -34,6 +34,7 @@ __all__ = [
     "laid_out",
     "placements",
     "without_lost_lines",
+    "without_strays",
 ]
 
 # A corner strays from the parabolas of its row and column by at most this share of a step.
@@ -102,7 +103,7 @@ def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
         found: the lattice.
         most: lines that are added at most.
     """
-    kept = _without_strays(found)
+    kept = without_strays(found)
     if kept is None:
         return None
     columns, rows = kept.size
@@ -226,7 +227,7 @@ def _foreseen(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "12 r c 2"]:
     return told
 
 
-def _without_strays(found: CornerLattice) -> CornerLattice | None:
+def without_strays(found: CornerLattice) -> CornerLattice | None:
     """The lattice without corners that are off their neighbours' lines, the worst first."""
     pixels, cells, bright = found
     for _ in range(CLEARING_ROUNDS):
