@@ -24,7 +24,6 @@ import numpy as np
 from orthoscope.fitting.board_turns import (
     Turn,
     least_turned,
-    member_of,
     shown_by,
     turns_after,
     turns_of,
@@ -76,13 +75,18 @@ def in_one_order(flat: Calibration) -> Calibration:
     return _turned(flat, turned) if turned else flat
 
 
+def _shown(detections: Detections, view: View) -> int:
+    """The number of the target's member that a view shows."""
+    return int(detections.member_of(view.ids[:1])[0])
+
+
 def _alone(flat: Calibration) -> Iterator[tuple[Int[ndarray, " v"], Calibration]]:
     """The calibration of each member by the views that show it, and which these are."""
     target, views = flat.detections.target, flat.detections.views
     if not target.members:
         yield np.arange(len(views)), flat
         return
-    shows = np.array([member_of(target, view) for view in views])
+    shows = np.array([_shown(flat.detections, view) for view in views])
     for number, (part, member) in enumerate(zip(target.parts, target.members, strict=True)):
         rows = np.flatnonzero(shows == number)
         mine = replace(
@@ -113,7 +117,7 @@ def _turned(flat: Calibration, turned: dict[int, Turn]) -> Calibration:
     views, poses = list(flat.detections.views), list(flat.camera_from_target)
     corners_of = {}
     for row, back in turned.items():
-        view, pose, part = views[row], poses[row], target.parts[member_of(target, views[row])]
+        view, pose, part = views[row], poses[row], target.parts[_shown(flat.detections, views[row])]
         corners = corners_of[view.image] = whole_turn(target, part, back)
         ids, middle = corners[view.ids], target.points[part].mean(0)
         order = np.argsort(ids)
@@ -155,8 +159,10 @@ def listed_as_known(camera: Camera, detections: Detections, shape: TargetShape |
         [whole_turn(target, part, turn) for turn in turns_of(member)]
         for part, member in zip(target.parts, target.members or (target,), strict=True)
     ]
+    if all(len(ways) == 1 for ways in turns):
+        return detections
     for view in detections.views:
-        ways = turns[member_of(target, view)]
+        ways = turns[_shown(detections, view)]
         listed = [replace(view, ids=corners[view.ids]) for corners in ways]
         views.append(
             min(listed, key=lambda one: _misses(camera, replace(detections, views=(one,)), shape))

@@ -8,10 +8,9 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.pose import nearest_rotation
-from orthoscope.targets.detections import View
 from orthoscope.targets.target import Target
 
-__all__ = ["Turn", "least_turned", "member_of", "shown_by", "turns_after", "turns_of", "whole_turn"]
+__all__ = ["Turn", "least_turned", "shown_by", "turns_after", "turns_of", "whole_turn"]
 
 # Points nearer than this share of the target's size are one.
 SAME_SHARE = 1e-6
@@ -51,11 +50,6 @@ def _fits(turn: Turn, points: Float[ndarray, "p 3"]) -> bool:
     return bool(
         np.abs(points @ turn.rotation.T - points[turn.corners]).max() < SAME_SHARE * np.ptp(points[:, :2])
     )
-
-
-def member_of(target: Target, view: View) -> int:
-    """The number of the target's member that a view shows; 0 where it has none."""
-    return next(number for number, part in enumerate(target.parts) if view.ids[0] < part.stop)
 
 
 def whole_turn(target: Target, part: slice, turn: Turn) -> Int[ndarray, " p"]:
