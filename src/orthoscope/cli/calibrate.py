@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from orthoscope.cli.shared import options
-from orthoscope.cli.shared.printing import tell, tell_json, tell_of_earlier
+from orthoscope.cli.shared.printing import tell, tell_json, tell_of_earlier, tell_remarks
 
 __all__ = ["calibrate", "calibrate_into"]
 
@@ -158,8 +158,7 @@ def calibrate_into(
         detections, files = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress, topic=topic
         )
-    for remark in detections.remarks:
-        tell(f"remark     {remark.image}: {remark.words}", err=True)
+    tell_remarks(detections)
     save(detections, out / "detections.json")
     written = [out / "detections.json"]
     detections = left_out(detections, without) if without else detections

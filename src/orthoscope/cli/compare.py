@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from orthoscope.cli.shared import options
-from orthoscope.cli.shared.printing import tell, tell_json
+from orthoscope.cli.shared.printing import tell, tell_json, tell_remarks
 
 if TYPE_CHECKING:
     from orthoscope.evaluation.comparison.compare import Comparison
@@ -97,6 +97,7 @@ def compare(
         detections, _ = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress
         )
+    tell_remarks(detections)
     with processes(jobs, cluster) as executor, bar("comparing") as progress:
         comparison = judge(detections, entries, folds=folds, executor=executor, progress=progress)
     texts = {

@@ -25,7 +25,8 @@ import numpy as np
 
 from orthoscope.files.whole_files import read_text, write_text
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.targets.detections import Detections, Remark, SetAside, View
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.mirrored import with_word_of_mirrors
 from orthoscope.targets.target import Target
 
 __all__ = ["read_vnl", "write_vnl"]
@@ -80,28 +81,7 @@ def read_vnl(path: str | Path, target: Target, image_size: tuple[int, int]) -> D
                 f" corners; target {target.name!r} has {len(target.points)}. Name the target that was"
                 " photographed, counting inner corners."
             )
-    return Detections(target, image_size, tuple(views), tuple(set_aside), remarks=_if_mirrored(views, target))
-
-
-def _if_mirrored(views: list[View], target: Target) -> tuple[Remark, ...]:
-    """A remark where most views are mirror images of a board whose front is known."""
-    if target.board is None or target.members:
-        return ()
-    mirrored = [view for view in views if len(view.ids) > 3 and _turning(view, target) < 0]
-    if 2 * len(mirrored) <= len(views):
-        return ()
-    words = (
-        f"a mirror image of {target.name}, as are {len(mirrored)} of {len(views)} views; expected it as seen"
-        " from the front. See that x and y are not swapped, and that corners of a row run from left to right"
-    )
-    return (Remark(mirrored[0].image, words),)
-
-
-def _turning(view: View, target: Target) -> float:
-    """Positive where the target's y lies clockwise of its x in the image, as on the front of a board."""
-    points = target.points[view.ids, :2]
-    axes = np.linalg.lstsq(points - points.mean(0), view.pixels - view.pixels.mean(0), rcond=None)[0]
-    return float(np.linalg.det(axes))
+    return with_word_of_mirrors(Detections(target, image_size, tuple(views), tuple(set_aside)))
 
 
 def write_vnl(detections: Detections, path: str | Path) -> None:
