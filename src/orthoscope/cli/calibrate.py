@@ -26,7 +26,7 @@ Example:
   wrote      camera/detections.json, camera/calibration.json, camera/evaluation.json, camera/report.html
 
 \b
-PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+PHOTOS are files, folders and globs; or one detections.json, corners.vnl or corners.csv.
 Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong,
 3 with --strict: the camera must not be used.
 """

@@ -34,7 +34,7 @@ Example:
 \b
 comparison.svg, for print, is written where matplotlib is installed (pip install 'orthoscope[figures]').
 WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or
-decoupled:brown:shape=flat; or a camera's file, whose camera stays as it is. PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+decoupled:brown:shape=flat; or a camera's file, whose camera stays as it is. PHOTOS are files, folders and globs; or one detections.json, corners.vnl or corners.csv.
 Exit: 0 done, 1 the photographs are too few to hold any out, 2 the command is wrong.
 """
 HEADINGS = ("", "held out (px)", "loses (px)", "NCE", "used (px)", "parameters", "seconds", "lens", "target")

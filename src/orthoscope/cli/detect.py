@@ -52,7 +52,7 @@ def detect(
     out: Path,
     as_json: bool,
 ) -> None:
-    """Find the target's corners in photographs (or turn a corners.vnl table into detections.json).
+    """Find the target's corners in photographs (or turn a corners.vnl or corners.csv into detections.json).
 
     With --target auto say which target the photographs show, of several each, and write nothing.
     """
