@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
+from benchmarks.studies.opencv_finders import FINDERS, apart
 from orthoscope.detection.detect import detect
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
@@ -41,8 +41,6 @@ CAMERA = Camera((1280, 960), Intrinsics(900.0, 898.0, 643.0, 477.0), Brown(k1=-0
 TILTS = (0.0, 0.9)
 # A camera is made of each of these sets of photographs, by their seeds.
 CAMERA_SETS = (1, 2, 3)
-
-Found = list[tuple[ndarray, Float[ndarray, "n 2"]]]
 
 
 class Photograph(NamedTuple):
@@ -69,55 +67,16 @@ def photographs_of(target: Target, count: int, *, seed: int = 0, camera: Camera 
     return found
 
 
-def _chessboard(picture: ndarray, target: Target) -> Float[ndarray, "n 2"] | None:
-    seen, corners = cv2.findChessboardCorners(picture, target.grid)
-    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-3)
-    return cv2.cornerSubPix(picture, corners, (5, 5), (-1, -1), criteria) if seen else None
-
-
-def _marked(picture: ndarray, target: Target) -> Float[ndarray, "n 2"] | None:
-    seen, corners = cv2.findChessboardCornersSB(picture, target.grid, flags=cv2.CALIB_CB_MARKER)
-    return corners if seen else None
-
-
-def _charuco(picture: ndarray, target: Target) -> Float[ndarray, "n 2"] | None:
-    board = target.board
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
-    theirs = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square, board.marker, dictionary)
-    return cv2.aruco.CharucoDetector(theirs).detectBoard(picture)[0]
-
-
-def _markers(picture: ndarray, target: Target) -> Float[ndarray, "n 2"] | None:
-    name, numbers = target.board.markers
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    parameters.markerBorderBits = 2 if target.kind == "aprilgrid" else 1
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
-    corners, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(picture)
-    read = () if ids is None else ids.ravel()
-    mine = [one for one, number in zip(corners, read, strict=True) if number in numbers]
-    return np.concatenate(mine) if mine else None
-
-
-def _circles(picture: ndarray, target: Target) -> Float[ndarray, "n 2"] | None:
-    layout = (
-        cv2.CALIB_CB_ASYMMETRIC_GRID if target.board.layout == "asymmetric" else cv2.CALIB_CB_SYMMETRIC_GRID
-    )
-    seen, centres = cv2.findCirclesGrid(picture, target.grid, flags=layout)
-    return centres if seen else None
-
-
-# Each board, and OpenCV's finder for its kind.
-KINDS: dict[str, Callable[[ndarray, Target], ndarray | None]] = {
-    "chessboard:9x6:25mm": _chessboard,
-    "marked:14x9:25mm": _marked,
-    "charuco:10x7:25mm:18mm:DICT_5X5_100": _charuco,
-    "aprilgrid:6x5:30mm:0.3": _markers,
-    "aruco:6x5:30mm:10mm:DICT_5X5_100": _markers,
-    "circles:4x11:20mm:asymmetric": _circles,
-    "circles:4x11:20mm:asymmetric:14mm": _circles,
-    "circles:9x7:20mm:symmetric:10mm": _circles,
-}
+KINDS = (
+    "chessboard:9x6:25mm",
+    "marked:14x9:25mm",
+    "charuco:10x7:25mm:18mm:DICT_5X5_100",
+    "aprilgrid:6x5:30mm:0.3",
+    "aruco:6x5:30mm:10mm:DICT_5X5_100",
+    "circles:4x11:20mm:asymmetric",
+    "circles:4x11:20mm:asymmetric:14mm",
+    "circles:9x7:20mm:symmetric:10mm",
+)
 
 
 def _told(spec: str, count: int) -> str:
@@ -134,12 +93,10 @@ def _told(spec: str, count: int) -> str:
             off = min((np.hypot(*(truth[way[sight.ids]] - sight.pixels).T) for way in ways), key=np.max)
             ours, errors = ours + len(off), [*errors, *off]
         before = time.process_time()
-        found = KINDS[spec](picture, target)
+        found = FINDERS[target.kind](picture, target)
         their_time += time.process_time() - before
-        if found is not None:
-            pixels = np.asarray(found, dtype=float).reshape(-1, 2)
-            off = np.linalg.norm(pixels[:, None] - truth, axis=-1).min(1)
-            theirs, their_errors = theirs + len(off), [*their_errors, *off]
+        off = apart(found, truth)
+        theirs, their_errors = theirs + len(off), [*their_errors, *off]
     every = sum(len(truth) for _, truth in shown)
     return (
         f"| `{spec}` | **{_rms(errors):.3f} px** (worst {max(errors, default=np.nan):.2f}),"

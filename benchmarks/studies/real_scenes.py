@@ -3,13 +3,15 @@
     python -m benchmarks.studies.real_scenes                     600 photographs
     python -m benchmarks.studies.real_scenes --count 3000 --seed 1
     python -m benchmarks.studies.real_scenes --only charuco --verbose
+    python -m benchmarks.studies.real_scenes --opencv            OpenCV's finders beside ours
     python -m benchmarks.studies.real_scenes --nothing           rooms without the board that is asked for
 
 A rendered board stands before a real photograph (`ORTHOSCOPE_DATASETS`), which often shows another
 chessboard. Then a camera does one thing to it, each in turn (`DISTURBANCES`): nothing, motion, glare, hard
 light and shadow, vignetting, a curve of its own, sharpening, JPEG of quality 30, a lens of 170 degrees.
 A false corner is more than 1 px from where its id is, in the best of the ways in which the board looks the
-same; under motion 2 px, since where a moving corner was is a matter of taste.
+same; under motion 2 px, since where a moving corner was is a matter of taste. OpenCV's corners are compared
+with the nearest that is there, whichever id they have.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import numpy as np
 
 from benchmarks.real_sets import SETS, datasets
 from benchmarks.studies.false_corners import BOARDS, Shown, errors_of
+from benchmarks.studies.opencv_finders import FINDERS, apart
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
 from orthoscope.fitting.disc_centres import disc_offsets
@@ -195,40 +198,37 @@ def _photograph(number: int, spec: str, rng: np.random.Generator) -> Shown | Non
     return Shown(number, target, name, told, picture, truth)
 
 
-class _Tally(NamedTuple):
-    photographs: int = 0
-    found: int = 0
-    shown: int = 0
-    corners: int = 0
-    false: int = 0
-    with_false: int = 0
-    square: float = 0.0
-    seconds: float = 0.0
+class _Tally:
+    """What a finder saw in photographs of one board, or with one disturbance, or in all."""
 
-    def row(self, name: str) -> str:
+    def __init__(self) -> None:
+        self.photographs = self.found = self.shown = self.corners = self.false = self.with_false = 0
+        self.square = self.seconds = 0.0
+
+    def add(self, shown: Shown, errors: Float[ndarray, " n"], seconds: float) -> None:
+        false = errors > (FALSE_IN_MOTION_PX if shown.quality == "motion" else FALSE_PX)
+        inside = ((shown.truth > 2) & (shown.truth < np.array(SIZE) - 3)).all(1)
+        self.photographs, self.found = self.photographs + 1, self.found + (len(errors) > 0)
+        self.shown, self.corners = self.shown + int(inside.sum()), self.corners + len(errors)
+        self.false, self.with_false = self.false + int(false.sum()), self.with_false + bool(false.any())
+        self.square, self.seconds = self.square + float((errors[~false] ** 2).sum()), self.seconds + seconds
+
+    def told(self) -> str:
+        """Photographs in which it found the board, corners, their error, those that are false, time."""
         rms = np.sqrt(self.square / max(self.corners - self.false, 1))
         return (
-            f"| {name} | {self.photographs} | {self.found} | {self.corners / max(self.shown, 1):.3f} |"
-            f" {rms:.3f} | {self.false} in {self.with_false} |"
-            f" {1e3 * self.seconds / max(self.photographs, 1):.0f} ms |"
+            f" {self.found} | {self.corners / max(self.shown, 1):.3f} | {rms:.3f} | {self.false} in"
+            f" {self.with_false} | {1e3 * self.seconds / max(self.photographs, 1):.0f} ms |"
         )
 
 
-def _with(tally: _Tally, shown: Shown, errors: ndarray, seconds: float) -> _Tally:
-    limit = FALSE_IN_MOTION_PX if shown.quality == "motion" else FALSE_PX
-    false = errors > limit
-    width, height = SIZE
-    inside = ((shown.truth > 2) & (shown.truth < [width - 3, height - 3])).all(1)
-    return _Tally(
-        tally.photographs + 1,
-        tally.found + (len(errors) > 0),
-        tally.shown + int(inside.sum()),
-        tally.corners + len(errors),
-        tally.false + int(false.sum()),
-        tally.with_false + bool(false.any()),
-        tally.square + float((errors[~false] ** 2).sum()),
-        tally.seconds + seconds,
-    )
+def _ours(picture: ndarray, shown: Shown) -> Float[ndarray, " n"]:
+    sight = see(picture, shown.target)
+    return errors_of(shown, sight) if isinstance(sight, Sight) else np.zeros(0)
+
+
+def _theirs(picture: ndarray, shown: Shown) -> Float[ndarray, " n"]:
+    return apart(FINDERS[shown.target.kind](picture, shown.target), shown.truth)
 
 
 def main() -> None:
@@ -241,34 +241,35 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="boards whose description begins so")
     parser.add_argument("--nothing", action="store_true", help="rooms alone: how many boards are seen there")
+    parser.add_argument("--opencv", action="store_true", help="OpenCV's finders beside ours")
     parser.add_argument(
         "--verbose", action="store_true", help="a line for each photograph with false corners"
     )
     given = parser.parse_args()
     cv2.setNumThreads(1)
-    tallies: dict[str, _Tally] = {}
+    finders = (_ours, _theirs) if given.opencv else (_ours,)
+    tallies: dict[str, list[_Tally]] = {}
     for shown in photographs(given.count, seed=given.seed, first=given.first, only=given.only):
         picture = shown.picture
         if given.nothing:
-            picture = room(shown.target.name, np.random.default_rng([given.seed, shown.number])).astype(
-                np.uint8
-            )
-        before = time.process_time()
-        sight = see(picture, shown.target)
-        seconds = time.process_time() - before
-        errors = errors_of(shown, sight) if isinstance(sight, Sight) else np.zeros(0)
-        for name in (f"`{shown.target.name}`", shown.quality, "all"):
-            tallies[name] = _with(tallies.get(name, _Tally()), shown, errors, seconds)
-        if given.verbose and (errors > FALSE_PX).any():
-            print(
-                f"  {shown.number}: {int((errors > FALSE_PX).sum())} of {len(errors)}"
-                f" ({errors.max():.1f} px) {shown.target.name} {shown.quality} {shown.told}",
-                flush=True,
-            )
-    print("| | photographs | found | corners found of those in the picture | rms, px | false | time |")
-    print("|---|---|---|---|---|---|---|")
-    for name, tally in sorted(tallies.items(), key=lambda each: (each[0][0] != "`", each[0] == "all")):
-        print(tally.row(name))
+            around = room(shown.target.name, np.random.default_rng([given.seed, shown.number]))
+            picture = around.astype(np.uint8)
+        for which, finder in enumerate(finders):
+            before = time.process_time()
+            errors = finder(picture, shown)
+            seconds = time.process_time() - before
+            for name in (f"`{shown.target.name}`", shown.quality, "all"):
+                tallies.setdefault(name, [_Tally() for _ in finders])[which].add(shown, errors, seconds)
+            if given.verbose and finder is _ours and (errors > FALSE_PX).any():
+                print(
+                    f"  {shown.number}: {int((errors > FALSE_PX).sum())} of {len(errors)}"
+                    f" ({errors.max():.1f} px) {shown.target.name} {shown.quality} {shown.told}",
+                    flush=True,
+                )
+    columns = " found | corners of those in the picture | rms, px | false | time |" * len(finders)
+    print(f"| | photographs |{columns}\n|{'---|' * (2 + 5 * len(finders))}")
+    for name, each in sorted(tallies.items(), key=lambda one: (one[0][0] != "`", one[0] == "all")):
+        print(f"| {name} | {each[0].photographs} |{''.join(tally.told() for tally in each)}")
 
 
 if __name__ == "__main__":

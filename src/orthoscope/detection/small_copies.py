@@ -1,4 +1,4 @@
-"""Smaller copies of a photograph, in which a board is found sooner."""
+"""Copies of a photograph of other sizes: smaller ones, in which a board is found sooner, or a larger one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import cv2
 
 from orthoscope.geometry.arrays import ndarray
 
-__all__ = ["resized", "to_photograph"]
+__all__ = ["enlarged", "resized", "to_photograph"]
 
 
 def resized(grey: ndarray, side: int) -> ndarray:
@@ -22,6 +22,11 @@ def resized(grey: ndarray, side: int) -> ndarray:
         return resized(half, side)
     height, width = (max(1, round(length * side / longer)) for length in grey.shape)
     return cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA)
+
+
+def enlarged(grey: ndarray) -> ndarray:
+    """A copy twice as large, in which small squares are told apart."""
+    return cv2.resize(grey, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
 
 
 def to_photograph(pixels: ndarray, copy: ndarray, grey: ndarray) -> ndarray:

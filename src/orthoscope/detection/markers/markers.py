@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.sight import TWICE
-from orthoscope.detection.small_copies import resized, to_photograph
+from orthoscope.detection.small_copies import enlarged, resized, to_photograph
 from orthoscope.geometry.arrays import Bool, Float, Int, ndarray
 from orthoscope.targets.markers import dictionary
 
@@ -77,9 +77,7 @@ def _most_markers(
     for side in (*COPY_SIDES, 0):
         if not side and (not len(best.numbers) or max(grey.shape) > LARGEST_ENLARGED):
             break  # enlarged where that may show more of those that are there
-        copy = (
-            resized(grey, side) if side else cv2.resize(grey, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
-        )
+        copy = resized(grey, side) if side else enlarged(grey)
         if copy.shape in shapes or min(copy.shape) < 16:
             continue
         shapes.add(copy.shape)
