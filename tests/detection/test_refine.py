@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from orthoscope.detection.chessboards.grid import grid_shape, lattice, nearest_neighbour, one_line_more
-from orthoscope.detection.saddles.linked import are_linked, hang_together
+from orthoscope.detection.saddles.linked import are_linked
 from orthoscope.detection.saddles.refine import refined
 from orthoscope.detection.saddles.saddle import fit_saddles
 from orthoscope.detection.saddles.saddle_arms import saddle_arms
@@ -113,14 +113,6 @@ def test_a_corner_beyond_a_gap_that_is_numbered_as_the_one_beside_it_does_not_ha
     pixels[(cells == (6, 2)).all(1)] += (0.0, 30.0)
     kept = are_linked(pixels[seen], cells[seen], cells[seen].astype(float))
     assert (kept == (cells[seen][:, 0] < 5)).all()
-
-
-def test_a_linked_corner_that_is_off_by_a_third_of_a_step_does_not_hang_together():
-    cells = lattice(9, 6).astype(int)
-    pixels = 30.0 * cells
-    pixels[22] += 12.0
-    kept = hang_together(pixels, cells, cells.astype(float))
-    assert list(np.flatnonzero(~kept)) == [22]
 
 
 def circles(columns: int = 9, rows: int = 6, radius: float = 400.0):

@@ -33,6 +33,7 @@ from orthoscope.detection.chessboards.partial_board import (
     placements,
     without_lost_lines,
 )
+from orthoscope.detection.saddles.contradicted import are_contradicted
 from orthoscope.detection.saddles.linked import are_linked
 from orthoscope.detection.saddles.refine import Refined, refined
 from orthoscope.detection.saddles.saddle_points import saddle_points
@@ -78,11 +79,15 @@ MOST_DOUBTFUL_SHARE = 0.4
 
 
 class _Laid(NamedTuple):
-    """A lattice laid on the board: ids (n,) in ascending order, pixels (n,2), and which of them are sure."""
+    """A lattice laid on the board: ids (n,) in ascending order, pixels (n,2), which of them are sure, how far
+    they spread by their windows, and which have windows with nothing but a saddle.
+    """
 
     ids: Int[ndarray, " n"]
     pixels: Float[ndarray, "n 2"]
     sure: Bool[ndarray, " n"]
+    spread: Float[ndarray, " n"]
+    plain: Bool[ndarray, " n"]
 
 
 def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight | Unseen:
@@ -118,7 +123,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         if sight and len(sight.ids) == board.columns * board.rows:
             large = (other for other in others if len(other.pixels) >= SECOND_BOARD_SHARE * len(sight.ids))
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in large)
-            return _sure(sight, board, TWICE if alike else "")
+            return _sure(grey, sight, board, TWICE if alike else "")
         parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: int(sight.sure.sum()), default=None)
     count = board.columns * board.rows
@@ -127,14 +132,21 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
     ):
         best = _by_opencv(grey, board) or best
     if best:
-        return _sure(best, board)
+        return _sure(grey, best, board)
     return Unseen("is in it in part only, and which part cannot be told" if open_ else "was not found in it")
 
 
-def _sure(laid: _Laid, board: Chessboard | MarkedChessboard, remark: str = "") -> Sight | Unseen:
-    """The corners of a board that are sure and hang together."""
-    ids, pixels = laid.ids[laid.sure], laid.pixels[laid.sure]
+def _sure(
+    grey: ndarray, laid: _Laid, board: Chessboard | MarkedChessboard, remark: str = ""
+) -> Sight | Unseen:
+    """The corners of a board that are sure, hang together and do not contradict each other."""
+    ids, pixels, _, spread, plain = (part[laid.sure] for part in laid)
     cells = np.stack([ids % board.columns, ids // board.columns], axis=1)
+    width, height = grey.shape[::-1]
+    contradicted = are_contradicted(
+        pixels, cells, board.grid, (width, height), spread=spread, doubtful=~plain
+    )
+    ids, pixels, cells = ids[~contradicted], pixels[~contradicted], cells[~contradicted]
     linked = are_linked(pixels, cells, cells.astype(float))
     if linked.sum() < FEWEST_PART_CORNERS:
         return Unseen("is in it, but too blurred, dim or small to say where its corners are")
@@ -222,11 +234,11 @@ def _on_board(
     ids = _first_way(ways, grid.corners, whole)
     if isinstance(board, MarkedChessboard):
         arms[np.isin(ids, board.marked_corners())] = board.arm
-    pixels, good, sure = _refined(grey, grid.corners, grid.seen, arms)
+    pixels, good, *evidence = _refined(grey, grid.corners, grid.seen, arms)
     if (less := without_lost_lines(grey, grid, pixels, good, max(board.grid))) and again:
         return _on_board(grey, less, board, again=False)
     order = np.argsort(ids[good])
-    return _Laid(ids[good][order], pixels[good][order], sure[good][order])
+    return _Laid(*(part[good][order] for part in (ids, pixels, *evidence)))
 
 
 def _alike(ways: list[ndarray], seen: Bool[ndarray, "r c"], symmetries: tuple[ndarray, ...]) -> bool:
@@ -250,8 +262,16 @@ def _refined(
     corners: Float[ndarray, "r c 2"],
     seen: Bool[ndarray, "r c"],
     arms: Float[ndarray, "r c"],
-) -> tuple[Float[ndarray, "r c 2"], Bool[ndarray, "r c"], Bool[ndarray, "r c"]]:
-    """The grid's corners in the photograph, which of them are good, and which of these are sure."""
+) -> tuple[
+    Float[ndarray, "r c 2"],
+    Bool[ndarray, "r c"],
+    Bool[ndarray, "r c"],
+    Float[ndarray, "r c"],
+    Bool[ndarray, "r c"],
+]:
+    """The grid's corners in the photograph, which of them are good, which of these are sure, how far they
+    spread, and which have plain windows.
+    """
     inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(-1)
     row, column = np.nonzero(seen | inside)
     places = np.stack([column, row], axis=1).astype(float)
@@ -264,13 +284,7 @@ def _refined(
         known[row[~off], column[~off]] = fine.pixels[~off]
         start = np.where(off[:, None], filled(known)[row, column], fine.pixels)
         again = refined(grey, start, places, approach=False, arm=arms[row, column])
-        fine = Refined(
-            np.where(off[:, None], again.pixels, fine.pixels),
-            np.where(off, again.believed, fine.believed),
-            np.where(off, again.explained, fine.explained),
-            np.where(off, again.sure, fine.sure),
-            np.where(off, again.whole, fine.whole),
-        )
+        fine = fine.with_others(off, again)
         off = _off(fine, places)
     fine, off = _on_smooth_grid(grey, fine, places, off, arms[row, column])
     off = _without_strays(fine, places, off)
@@ -280,9 +294,10 @@ def _refined(
         good[:] = False
     pixels = corners.copy()
     pixels[row, column] = fine.pixels
-    sure = np.zeros_like(seen)
+    sure, plain, spread = np.zeros_like(seen), np.zeros_like(seen), np.zeros(seen.shape)
     sure[row, column] = fine.sure & fine.whole
-    return pixels, good, sure
+    spread[row, column], plain[row, column] = fine.spread, fine.plain
+    return pixels, good, sure, spread, plain
 
 
 def _on_smooth_grid(
@@ -305,15 +320,14 @@ def _on_smooth_grid(
     )
     if not away.any():
         return fine, off
-    pixels, believed, sure, off = fine.pixels.copy(), fine.believed.copy(), fine.sure.copy(), off.copy()
-    whole = fine.whole.copy()
-    pixels[on[away]] = foreseen[away]
-    again = refined(grey, pixels[on], places[on], approach=False, arm=arms[on])
-    pixels[on[away]], believed[on[away]] = again.pixels[away], again.believed[away]
-    sure[on[away]], whole[on[away]] = again.sure[away], again.whole[away]
+    start, off = np.where(away[:, None], foreseen, fine.pixels[on]), off.copy()
+    again = refined(grey, start, places[on], approach=False, arm=arms[on])
     moved = np.hypot(*(again.pixels - foreseen).T)
     off[on[away]] = ((moved > limit) | ~again.believed)[away]
-    return Refined(pixels, believed, fine.explained, sure, whole), off
+    fine = Refined(*(part.copy() for part in fine))
+    for part, new in zip(fine, again, strict=True):
+        part[on[away]] = new[away]
+    return fine, off
 
 
 def _without_strays(
@@ -325,7 +339,7 @@ def _without_strays(
         on = np.flatnonzero(~off)
         if len(on) < FEWEST_PART_CORNERS:
             break
-        some = Refined(*(part[on] for part in fine))
+        some = fine.of(on)
         strays = _off(some, places[on])
         if not strays.any():
             break

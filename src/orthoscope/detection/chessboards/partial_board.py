@@ -14,6 +14,7 @@ board's own symmetry, give the ids; more than one leave them open.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import cv2
@@ -57,6 +58,8 @@ THIN_LINE_SHARE = 0.34
 PLACES_IN_SQUARE = (0.3, 0.5, 0.7)
 # The place with the least contrast of bright to dark squares has at least this share of the greatest.
 LEAST_PLAIN_SHARE = 0.37
+# Of the squares of a strip whose corners are all seen more than this share is plain, or there is a fault.
+LEAST_PLAIN_SQUARES_SHARE = 0.5
 # So many lines more are needed for the shape of those.
 SHAPING_LINES = 2
 # The usual difference of corners' strengths from their median is less than this share of it on a board.
@@ -118,6 +121,9 @@ def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
     bright ^= bool((box[0].start + box[1].start) % 2)
     grid, seen = filled(corners[box]), seen[box]
     seen |= _stands(grey, grid, bright)
+    part = _without_faults(grey, grid, seen, bright)
+    bright ^= bool((part[0].start + part[1].start) % 2)
+    grid, seen = grid[part], seen[part]
     return _taken_further(grey, grid, seen, bright, most)
 
 
@@ -314,11 +320,52 @@ def has_plain_squares(grey: ndarray, grid: Grid) -> bool:
     Where a board is seen small and slanted a lattice may link every other corner, or middles of squares: its
     own squares are then parts of several.
     """
-    corners = grid.corners
-    rows, columns = grid.seen.shape[0] - 1, grid.seen.shape[1] - 1
-    bright = (np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0) == grid.bright
+    bright = _bright_squares(grid.seen.shape, grid.bright)
     if bright.all() or not bright.any():
         return True
+    values = _in_squares(grey, grid.corners)
+    if values is None:
+        return False
+    contrast = values[:, bright].mean(1) - values[:, ~bright].mean(1)
+    return bool(contrast.min() > LEAST_PLAIN_SHARE * contrast.max())
+
+
+def _without_faults(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool) -> tuple[slice, slice]:
+    """Rows and columns of the part without faults: strips of squares, from side to side, that are not plain.
+
+    Where squares are small and slanted, links may leap from a corner to one that is a square farther to the
+    side; on both sides of them the lattice is right, but its lines do not belong together.
+    """
+    rows, columns = (slice(0, count) for count in seen.shape)
+    colours = _bright_squares(seen.shape, bright)
+    whole = seen[:-1, :-1] & seen[1:, :-1] & seen[:-1, 1:] & seen[1:, 1:]
+    if not (whole & colours).any() or not (whole & ~colours).any():
+        return rows, columns
+    values = _in_squares(grey, grid)
+    if values is None:
+        return rows, columns
+    level = 0.5 * (median(values[:, whole & colours]) + median(values[:, whole & ~colours]))
+    plain = whole & np.where(colours, values.min(0) > level, values.max(0) < level)
+    for axis in (0, 1):
+        known, right = whole.sum(1 - axis), plain.sum(1 - axis)
+        faults = np.flatnonzero((known > 0) & (right <= LEAST_PLAIN_SQUARES_SHARE * known)) + 1
+        ends = [0, *faults.tolist(), seen.shape[axis]]
+        parts = [slice(start, end) for start, end in pairwise(ends)]
+        lines = seen.sum(1 - axis)
+        most = max(parts, key=lambda part: lines[part].sum())
+        rows, columns = (most, columns) if axis == 0 else (rows, most)
+    return rows, columns
+
+
+def _bright_squares(shape: tuple[int, ...], bright: bool) -> Bool[ndarray, "a b"]:
+    """Which squares between a grid's corners are the bright ones."""
+    return (np.add.outer(np.arange(shape[0] - 1), np.arange(shape[1] - 1)) % 2 == 0) == bright
+
+
+def _in_squares(grey: ndarray, corners: Float[ndarray, "r c 2"]) -> Float[ndarray, "9 a b"] | None:
+    """The grey of nine places in each square between a grid's corners; None where that is not in the
+    picture.
+    """
     u, v = (part.reshape(-1, 1, 1, 1) for part in np.meshgrid(PLACES_IN_SQUARE, PLACES_IN_SQUARE))
     places = (1 - v) * ((1 - u) * corners[:-1, :-1] + u * corners[:-1, 1:])
     places += v * ((1 - u) * corners[1:, :-1] + u * corners[1:, 1:])
@@ -326,11 +373,10 @@ def has_plain_squares(grey: ndarray, grid: Grid) -> bool:
     high = np.maximum(np.ceil(places.reshape(-1, 2).max(0)) + 5, low + 1).astype(int)
     part = cv2.GaussianBlur(grey[low[1] : high[1], low[0] : high[0]], (0, 0), 1.0)
     if not part.size:
-        return False
+        return None
     x, y = (places - low).reshape(len(places), -1, 2).astype(np.float32).transpose(2, 0, 1)
     values = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
-    contrast = values[:, bright.ravel()].mean(1) - values[:, ~bright.ravel()].mean(1)
-    return bool(contrast.min() > LEAST_PLAIN_SHARE * contrast.max())
+    return values.reshape(places.shape[:3])
 
 
 def _next_line_stands(grey: ndarray, more: ndarray, bright: bool) -> ndarray:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from orthoscope.detection.discs.disc_foresight import is_among
-from orthoscope.detection.discs.disc_growth import with_next
+from orthoscope.detection.discs.disc_growth import FEWEST_DISCS, with_next
 from orthoscope.detection.discs.disc_lattice import laid_on
 from orthoscope.detection.discs.disc_links import diameter_in_steps, numbered
-from orthoscope.detection.discs.disc_outlines import fitted_whole, outlines_near, smoothed, spots
+from orthoscope.detection.discs.disc_outlines import fitted_whole, outlines_near, smoothed
+from orthoscope.detection.discs.disc_spots import spots
 from orthoscope.detection.discs.whole_discs import are_whole
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.small_copies import resized, to_photograph
@@ -24,8 +25,6 @@ __all__ = ["see_circles"]
 
 # Copies have these longer sides, pixels.
 COPY_SIDES = (640, 1280, 2560)
-# A sight of the board has at least this many discs.
-FEWEST_DISCS = 6
 # A sight of the board has at least this share of its discs.
 LEAST_DISCS_SHARE = 0.15
 # Where this share of the board's discs hangs together, others are sought that were no spots.

@@ -16,19 +16,22 @@ __all__ = ["FORESEEING_DISCS", "beside", "foreseen", "foretelling", "is_among"]
 FORESEEING_DISCS = 12
 # A disc is seen when it is in the picture with its radii multiplied by this.
 SEEN_MARGIN = 1.25
-# Places of a lattice are fewer than this either way.
-MOST_PLACES = 1 << 20
 
 
 def beside(places: Int[ndarray, "n 2"]) -> Int[ndarray, "k 2"]:
     """The places of a lattice that are next to these and none of these."""
-    around = np.unique((places[:, None] + DIRECTION_STEPS).reshape(-1, 2), axis=0)
-    return around[~is_among(around, places)]
+    known, around = ({tuple(place) for place in part.tolist()} for part in (places, _around(places)))
+    return np.array(sorted(around - known), dtype=int).reshape(-1, 2)
+
+
+def _around(places: Int[ndarray, "n 2"]) -> Int[ndarray, "m 2"]:
+    return (places[:, None] + DIRECTION_STEPS).reshape(-1, 2)
 
 
 def is_among(places: Int[ndarray, "n 2"], others: Int[ndarray, "k 2"]) -> Bool[ndarray, " n"]:
     """Which places are one of the others."""
-    return np.isin(*(part[:, 0] * MOST_PLACES + part[:, 1] for part in (places, others)))
+    among = {tuple(place) for place in others.tolist()}
+    return np.array([tuple(place) in among for place in places.tolist()], dtype=bool)
 
 
 def foreseen(

@@ -8,7 +8,7 @@ from orthoscope.detection.discs.disc_foresight import beside, foreseen, is_among
 from orthoscope.detection.discs.disc_outlines import Outlines, outlines_near
 from orthoscope.geometry.arrays import Float, Int, median, ndarray
 
-__all__ = ["with_next"]
+__all__ = ["FEWEST_DISCS", "with_next"]
 
 # A disc is no farther from where it was foreseen than so many of its radii.
 FARTHEST_RADII = 0.8
@@ -16,7 +16,7 @@ FARTHEST_RADII = 0.8
 MOST_AREA_RATIO = 1.6
 # Its contrast is at least this share of what is usual.
 LEAST_CONTRAST_SHARE = 0.5
-# Fewer discs foresee no others.
+# Fewer discs are no sight of a board, and foresee no others.
 FEWEST_DISCS = 6
 
 
@@ -44,6 +44,8 @@ def with_next(
         wanted = beside(places)
         wanted = wanted if among is None else wanted[is_among(wanted, among)]
         more, there = foreseen(rays.ellipses, places, wanted, smooth.shape)
+        if not len(more):
+            break
         asked.append(there.centres)
         added = outlines_near(smooth, there)
         seen = np.isfinite(added.ellipses.centres[:, 0])

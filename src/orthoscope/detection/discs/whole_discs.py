@@ -59,14 +59,7 @@ def are_whole(discs: Outlines, places: Int[ndarray, "n 2"]) -> Bool[ndarray, " n
     radii = np.sqrt(np.abs(np.linalg.det(discs.ellipses.axes)))
     good = roughness < max(MOST_ROUGH * median(roughness), SMOOTH_RADII)
     known = np.column_stack([centres, np.log(radii)])
-    off = np.zeros((len(places), 3))
-    for number in range(len(places)):
-        others = np.flatnonzero(good & (np.arange(len(places)) != number))
-        apart = np.abs(places[others] - places[number]).sum(-1)
-        nearest = others[np.argsort(apart, kind="stable")[:FORESEEING_DISCS]]
-        if len(nearest) > FEWEST_FORESEEING:
-            weights = foretelling(places[nearest] - places[number])
-            off[number] = (weights @ known[nearest] - known[number]) / max(1.0, np.linalg.norm(weights))
+    off = _off_foreseen(places, known, good)
     off_place = np.hypot(off[:, 0], off[:, 1]) / radii
     off_size, off_contrast = np.abs(off[:, 2]), _off_parabola(places, np.log(discs.contrast))
     usual = TIMES_OFF_PLACE * median(off_place)
@@ -80,6 +73,22 @@ def are_whole(discs: Outlines, places: Int[ndarray, "n 2"]) -> Bool[ndarray, " n
     good &= off_place < np.where(discs.doubt < LEAST_DOUBT, SURELY_NEAR, farthest)
     good &= off_contrast < max(MOST_OFF_CONTRAST, TIMES_OFF_CONTRAST * median(off_contrast))
     return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
+
+
+def _off_foreseen(
+    places: Int[ndarray, "n 2"], values: Float[ndarray, "n k"], good: Bool[ndarray, " n"]
+) -> Float[ndarray, "n k"]:
+    """How far values are from where the nearest of the good ones foresee them; 0 of few discs."""
+    count = min(FORESEEING_DISCS, int(good.sum()) - 1)
+    if count <= FEWEST_FORESEEING:
+        return np.zeros(values.shape)
+    apart = np.abs(places[:, None] - places).sum(-1).astype(float)
+    apart[:, ~good] = np.inf
+    np.fill_diagonal(apart, np.inf)
+    nearest = np.argsort(apart, axis=1, kind="stable")[:, :count]
+    weights = np.array([foretelling(steps) for steps in places[nearest] - places[:, None]])
+    far = np.maximum(1.0, np.linalg.norm(weights, axis=1))
+    return (np.einsum("nj,njk->nk", weights, values[nearest]) - values) / far[:, None]
 
 
 def _off_parabola(places: Int[ndarray, "n 2"], values: Float[ndarray, " n"]) -> Float[ndarray, " n"]:

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from orthoscope.detection.discs.disc_links import diameter_in_steps, numbered
-from orthoscope.detection.discs.disc_outlines import fitted_whole, outlines_near, smoothed, spots
+from orthoscope.detection.discs.disc_outlines import fitted_whole, outlines_near, smoothed
+from orthoscope.detection.discs.disc_spots import spots
 from orthoscope.detection.small_copies import resized
 from orthoscope.geometry.arrays import Int, ndarray
 from orthoscope.geometry.ellipses import Ellipses

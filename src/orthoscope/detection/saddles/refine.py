@@ -77,6 +77,8 @@ class Refined(NamedTuple):
         explained: share of its window's variance that the saddle explains.
         sure: whether the saddle says to well within a pixel where the corner is, and is like the others'.
         whole: whether all its arms agree about it; where something covers a part of a window, they do not.
+        spread: its standard deviation in its worst direction, pixels, by what its saddle leaves.
+        plain: whether its window holds hardly anything but the saddle.
     """
 
     pixels: Float[ndarray, "m 2"]
@@ -84,6 +86,21 @@ class Refined(NamedTuple):
     explained: Float[ndarray, " m"]
     sure: Bool[ndarray, " m"]
     whole: Bool[ndarray, " m"]
+    spread: Float[ndarray, " m"]
+    plain: Bool[ndarray, " m"]
+
+    def of(self, which: ndarray) -> Refined:
+        """Some of them."""
+        return Refined(*(part[which] for part in self))
+
+    def with_others(self, which: Bool[ndarray, " m"], others: Refined) -> Refined:
+        """Some of them replaced by those of `others`."""
+        return Refined(
+            *(
+                np.where(which[:, None] if one.ndim > 1 else which, other, one)
+                for one, other in zip(self, others, strict=True)
+            )
+        )
 
 
 def refined(
@@ -129,7 +146,8 @@ def refined(
     left = 1.0 - saddles.explained - noise_share
     left -= median(left)
     whole = np.ones(len(left), dtype=bool)
-    asked = np.flatnonzero(left > HARDLY_UNEXPLAINED + HARDLY_UNEXPLAINED_NOISE * noise_share)
+    plain = left <= HARDLY_UNEXPLAINED + HARDLY_UNEXPLAINED_NOISE * noise_share
+    asked = np.flatnonzero(~plain)
     if len(asked):
         some = Saddles(*(part[asked] for part in saddles))
         told = saddle_arms(smooth, some, along[asked], down[asked], bends=bends[asked], arms=arms[asked])
@@ -139,7 +157,8 @@ def refined(
         unlike = (arms[asked] >= 1.0) & (told.spread < SMALL_ARM_SPREAD).all(1)
         saddles.places[asked[unlike]] = told.places[unlike]
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
-    return Refined(pixels, believed, saddles.explained, sure & _are_alike(saddles, shape), whole)
+    sure &= _are_alike(saddles, shape)
+    return Refined(pixels, believed, saddles.explained, sure, whole, saddles.spread * shrink, plain)
 
 
 def _have_whole_arms(told: SaddleArms, little: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Bool, Float, median, ndarray
 
-__all__ = ["off_smooth_grid"]
+__all__ = ["off_smooth_grid", "smooth_fit", "smooth_terms"]
 
 # Corners are off by more than so many times the usual residual.
 TIMES_USUAL = 8.0
@@ -61,14 +61,12 @@ def off_smooth_grid(
         most_order: of the polynomial; of corners that are mistaken four together a higher one follows them.
     """
     none = np.zeros(len(pixels), dtype=bool), pixels.copy(), np.inf
-    reach = min(np.ptp(places, axis=0).min() - 1, most_order)
-    orders = ORDERS_OF_POOR if poor else ORDERS
-    order = next((order for order, needed in orders if len(pixels) >= needed and reach >= order), None)
-    if order is None:
+    terms = smooth_terms(places, ORDERS_OF_POOR if poor else ORDERS, most_order=most_order)
+    if terms is None:
         return none
-    terms, off, foreseen, limit = _terms(places, order), none[0].copy(), pixels, np.inf
+    off, foreseen, limit = none[0].copy(), pixels, np.inf
     while off.sum() <= MOST_OUT_SHARE * len(off):
-        fitted, weight = _fitted(pixels, places, terms, ~off)
+        fitted, weight = smooth_fit(pixels, places, terms, ~off)
         if fitted is None:
             return none
         foreseen = np.where(off[:, None], fitted, pixels + (fitted - pixels) / (1.0 - weight)[:, None])
@@ -84,12 +82,31 @@ def off_smooth_grid(
     return off, foreseen, limit
 
 
-def _terms(places: Float[ndarray, "m 2"], order: int) -> Float[ndarray, "m t"]:
+def smooth_terms(
+    places: Float[ndarray, "m 2"],
+    orders: tuple[tuple[int, int], ...] = ORDERS,
+    *,
+    most_order: int = ORDERS[0][0],
+) -> Float[ndarray, "m t"] | None:
+    """The terms of a polynomial of as high an order as so many corners at these places bear; None where they
+    bear none.
+
+    Args:
+        places: column and row of each corner in the lattice.
+        orders: from the highest, with the corners that each needs.
+        most_order: the highest that is wanted.
+    """
+    if not len(places):
+        return None
+    reach = min(np.ptp(places, axis=0).min() - 1, most_order)
+    order = next((order for order, needed in orders if len(places) >= needed and reach >= order), None)
+    if order is None:
+        return None
     x, y = (2.0 * (places - places.min(0)) / np.ptp(places, axis=0) - 1.0).T
     return np.stack([x**i * y**j for i in range(order + 1) for j in range(order + 1 - i)], axis=1)
 
 
-def _fitted(
+def smooth_fit(
     pixels: ndarray, places: ndarray, terms: ndarray, used: ndarray
 ) -> tuple[Float[ndarray, "m 2"] | None, Float[ndarray, " m"]]:
     """Where homography and polynomial through the used corners have all of them, and each one's weight."""
