@@ -29,6 +29,7 @@ __all__ = [
     "grid_of",
     "is_even",
     "laid_out",
+    "on_lines",
     "placements",
     "without_lost_lines",
     "without_strays",
@@ -209,18 +210,31 @@ def _foreseen(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "12 r c 2"]:
 
 
 def without_strays(found: CornerLattice) -> CornerLattice | None:
-    """The lattice without corners that are off their neighbours' lines, the worst first."""
-    pixels, cells, bright = found
+    """The lattice without corners that are off their neighbours' lines; None where hardly any is left."""
+    keep = on_lines(found.pixels, found.cells.astype(float))
+    if keep is None:
+        return None
+    cells = found.cells[keep]
+    return CornerLattice(found.pixels[keep], cells - cells.min(0), found.bright[keep])
+
+
+def on_lines(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"] | None:
+    """Which corners of a lattice are on their neighbours' lines, the worst taken out first; None where hardly
+    any is.
+
+    Args:
+        pixels: the corners.
+        places: column and row of each in the lattice, in steps.
+    """
+    keep = np.arange(len(pixels))
     for _ in range(CLEARING_ROUNDS):
-        if len(pixels) < max(4, LEAST_LEFT_SHARE * len(found.pixels)):
+        if len(keep) < max(4, LEAST_LEFT_SHARE * len(pixels)):
             return None
-        stray = grid_shape(pixels, cells.astype(float)).stray
+        stray = grid_shape(pixels[keep], places[keep]).stray
         if stray.max() <= FARTHEST_STRAY_SHARE:
             break
-        keep = stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())
-        pixels, cells, bright = pixels[keep], cells[keep], bright[keep]
-    cells = cells - cells.min(0)
-    return CornerLattice(pixels, cells, bright)
+        keep = keep[stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())]
+    return np.isin(np.arange(len(pixels)), keep)
 
 
 def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:
