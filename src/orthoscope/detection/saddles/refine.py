@@ -79,6 +79,7 @@ class Refined(NamedTuple):
         whole: whether all its arms agree about it; where something covers a part of a window, they do not.
         spread: its standard deviation in its worst direction, pixels, by what its saddle leaves.
         plain: whether its window holds hardly anything but the saddle.
+        contrast: grey levels; of one sign where the square towards the next column and row is bright.
     """
 
     pixels: Float[ndarray, "m 2"]
@@ -88,6 +89,7 @@ class Refined(NamedTuple):
     whole: Bool[ndarray, " m"]
     spread: Float[ndarray, " m"]
     plain: Bool[ndarray, " m"]
+    contrast: Float[ndarray, " m"]
 
     def of(self, which: ndarray) -> Refined:
         """Some of them."""
@@ -158,7 +160,9 @@ def refined(
         saddles.places[asked[unlike]] = told.places[unlike]
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     sure &= _are_alike(saddles, shape)
-    return Refined(pixels, believed, saddles.explained, sure, whole, saddles.spread * shrink, plain)
+    return Refined(
+        pixels, believed, saddles.explained, sure, whole, saddles.spread * shrink, plain, saddles.contrast
+    )
 
 
 def _have_whole_arms(told: SaddleArms, little: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:
