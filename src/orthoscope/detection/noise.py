@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from orthoscope.geometry.arrays import median, ndarray
@@ -11,6 +10,9 @@ __all__ = ["noise_variance"]
 
 # So many pixels, evenly picked, tell the noise.
 NOISE_PIXELS = 10_000
+# A pixel and those around it, down and across, with weights that leave nothing of a slope.
+OFFSETS = np.array([(down, across) for down in (-1, 0, 1) for across in (-1, 0, 1)])
+WEIGHTS = np.array([1, -2, 1, -2, 4, -2, 1, -2, 1], dtype=np.float32)
 
 
 def noise_variance(grey: ndarray) -> float:
@@ -19,6 +21,12 @@ def noise_variance(grey: ndarray) -> float:
     Args:
         grey: (h,w) uint8.
     """
-    rough = cv2.filter2D(grey, cv2.CV_32F, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32))
-    rough = rough.ravel()[:: max(1, rough.size // NOISE_PIXELS)]
+    height, width = grey.shape
+    if min(height, width) < 3:
+        return 0.0
+    row, column = np.divmod(
+        np.arange(0, (height - 2) * (width - 2), max(1, height * width // NOISE_PIXELS)), width - 2
+    )
+    at = ((row + 1) * width + column + 1)[:, None] + (OFFSETS @ [width, 1])
+    rough = grey.ravel().take(at).astype(np.float32) @ WEIGHTS
     return float((median(np.abs(rough)) / (0.6745 * 6.0)) ** 2)
