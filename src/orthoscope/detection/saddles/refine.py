@@ -115,6 +115,11 @@ class Refined(NamedTuple):
         """Some of them."""
         return Refined(*(part[which] for part in self[:-1]), self.usual)
 
+    def among(self, ids: Int[ndarray, " m"], count: int) -> Refined:
+        """Them at their numbers among so many, of which the others are nothing yet."""
+        parts = [np.zeros((count, *part.shape[1:]), part.dtype) for part in self[:-1]]
+        return Refined(*parts, self.usual).with_others(ids, self)
+
     def with_others(self, which: ndarray, others: Refined) -> Refined:
         """Some of them, by their numbers, replaced."""
         parts = [part.copy() for part in self[:-1]]
