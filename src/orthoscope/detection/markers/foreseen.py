@@ -7,10 +7,10 @@ over 1 - h). Then
 
     a corner is off by        the distance from where it is foreseen
     others miss by            usual / sqrt(1 - h), more at the board's own corners, which weigh most
-    orders beyond may add     as much as this order moves what the one before foresees there
+    orders beyond may add     as much as the next ones move what is foreseen there, or this one did
 
 and what is for any order farther off than all that together was mistaken: low orders are coarse and certain,
-high ones fine and lenient at the board's corners. The worst is taken out until none is left.
+high ones fine, and lenient at the board's corners. The worst is taken out until none is left.
 
 Corners that are not known yet are foreseen by the nearest ones that are, by a polynomial.
 """
@@ -28,6 +28,8 @@ __all__ = ["are_off", "next_corners"]
 TIMES_USUAL = 6.0
 # And beyond at least this, pixels.
 LEAST_PX = 0.6
+# An order is compared with the one before and so many beyond it: of a lens every other one is small.
+ORDERS_BEYOND = 2
 # The highest order of the polynomial, and so many corners to each of its terms.
 MOST_ORDER, CORNERS_PER_TERM = 5, 2
 # A corner's own weight in a fit counts as at most this.
@@ -124,16 +126,18 @@ def _excess(rest: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Float
     powers = [x ** (order - i) * y**i for order in range(orders[-1] + 1) for i in range(order + 1)]
     basis, triangle = np.linalg.qr(np.stack(powers, axis=1))
     basis = basis * (np.abs(np.diag(triangle)) > LEAST_INDEPENDENT * np.sqrt(len(rest)))
-    excess, before = np.zeros(len(rest)), None
+    off, weights = [], []
     for order in orders:
         some = basis[:, : _count(order)]
-        weights = np.minimum((some * some).sum(1), MOST_WEIGHT)
-        off = (rest - some @ (some.T @ rest)) / (1.0 - weights)[:, None]
-        residual = np.hypot(*off.T)
-        missed = np.maximum(TIMES_USUAL * median(residual) / np.sqrt(1.0 - weights), LEAST_PX)
-        beyond = 0.0 if before is None else np.hypot(*(off - before).T)
+        weights.append(np.minimum((some * some).sum(1), MOST_WEIGHT))
+        off.append((rest - some @ (some.T @ rest)) / (1.0 - weights[-1])[:, None])
+    excess = np.zeros(len(rest))
+    for number, (here, weight) in enumerate(zip(off, weights, strict=True)):
+        residual = np.hypot(*here.T)
+        missed = np.maximum(TIMES_USUAL * median(residual) / np.sqrt(1.0 - weight), LEAST_PX)
+        others = np.stack(off[max(number - 1, 0) : number + ORDERS_BEYOND + 1])
+        beyond = np.hypot(*(others - here).transpose(2, 0, 1)).max(0)
         excess = np.maximum(excess, residual / (missed + beyond))
-        before = off
     return excess
 
 

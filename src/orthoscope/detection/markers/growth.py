@@ -14,7 +14,7 @@ import numpy as np
 from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
 from orthoscope.detection.markers.foreseen import are_off, next_corners
 from orthoscope.detection.saddles.linked import are_linked
-from orthoscope.detection.saddles.refine import refined
+from orthoscope.detection.saddles.refine import Refined, refined, sought_again
 from orthoscope.detection.sight import Sight
 from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 
@@ -78,32 +78,60 @@ def grown_from(
         board: whose they are.
         approach: whether they may be off by more than a saddle's fit mends.
     """
-    places = board.places
-    start = pixels = rough.copy()
-    good, sure = np.zeros((2, len(places)), dtype=bool)
-    tried, tries = np.full_like(start, np.nan), np.zeros(len(places), dtype=int)
+    places, count = board.places, len(board.places)
+    start, good, fine = rough.copy(), np.zeros(count, dtype=bool), None
+    tried, tries = np.full_like(start, np.nan), np.zeros(count, dtype=int)
     for _ in range(int(board.cells.max(0).sum()) + 2):
         moved = ~(np.hypot(*(start - tried).T) < MOVED_SHARE * _step(start, places))
         new = _inside(start, grey.shape) & ~good & moved & (tries < MOST_TRIES)
         if not new.any():
             break
         tried[new], tries[new] = start[new], tries[new] + 1
-        ids = np.flatnonzero(good | new)
-        fine = refined(grey, start[ids], places[ids], approach=approach, arm=board.arm)
-        step = np.maximum(nearest_neighbour(start[ids], places[ids]), LEAST_STEP_PX)
-        fits = fine.believed & (grid_shape(fine.pixels, places[ids]).stray < MOST_STRAY_SHARE)
-        fits &= np.hypot(*(fine.pixels - start[ids]).T) < FARTHEST_SHARE * step
-        before, known = int(good.sum()), ids[fits]
-        pixels, good = np.full_like(pixels, np.nan), np.zeros_like(good)
-        pixels[known], good[known] = fine.pixels[fits], True
-        sure[ids] = fits & fine.sure & fine.whole
-        start = pixels.copy()
-        more, there = next_corners(places, known, pixels[known], board.reach)
+        ids, before = np.flatnonzero(good | new), int(good.sum())
+        if fine is None:
+            some = refined(grey, start[ids], places[ids], approach=approach, arm=board.arm)
+            fine = some.among(ids, count)
+        else:
+            some = sought_again(grey, fine.of(ids), start[ids], places[ids], new[ids], arm=board.arm)
+            fine = fine.with_others(ids, some)
+        good[ids] = _fit(some, start[ids], ids, board)
+        known = np.flatnonzero(good)
+        start = np.where(good[:, None], fine.pixels, np.nan)
+        more, there = next_corners(places, known, fine.pixels[known], board.reach)
         start[more] = there
         if len(known) < FEWEST_CORNERS or len(known) <= before:
             break
     missing = int((_inside(start, grey.shape) & ~good).sum())
-    return Grown(pixels, good & sure, missing <= MOST_MISSING_SHARE * good.sum())
+    if fine is None:
+        return Grown(start, good, False)
+    fine, good = _once_more(grey, fine, good, board)
+    pixels = np.where(good[:, None], fine.pixels, np.nan)
+    return Grown(pixels, good & fine.sure & fine.whole, missing <= MOST_MISSING_SHARE * good.sum())
+
+
+def _once_more(
+    grey: ndarray, fine: Refined, good: Bool[ndarray, " m"], board: CornersOfBoard
+) -> tuple[Refined, Bool[ndarray, " m"]]:
+    """The corners that are good fitted from where they are: how their lines bend is known better now."""
+    ids = np.flatnonzero(good)
+    if not len(ids):
+        return fine, good
+    start = fine.pixels[ids]
+    again = refined(grey, start, board.places[ids], approach=False, arm=board.arm)
+    good = good.copy()
+    good[ids] = _fit(again, start, ids, board)
+    return fine.with_others(ids, again), good
+
+
+def _fit(
+    fine: Refined, start: Float[ndarray, "k 2"], ids: Int[ndarray, " k"], board: CornersOfBoard
+) -> Bool[ndarray, " k"]:
+    """Which corners are saddles of the board's lattice where they were foreseen."""
+    places = board.places[ids]
+    step = np.maximum(nearest_neighbour(start, places), LEAST_STEP_PX)
+    fits = fine.believed & (grid_shape(fine.pixels, places).stray < MOST_STRAY_SHARE)
+    fits &= np.hypot(*(fine.pixels - start).T) < FARTHEST_SHARE * step
+    return fits & _alternate(fine.contrast, fits, board.cells[ids])
 
 
 def sight_of(grown: Grown, board: CornersOfBoard, shape: tuple[int, ...], remark: str) -> Sight | None:
@@ -148,6 +176,17 @@ def grown_with(
     both = np.where(np.isfinite(seen.pixels), seen.pixels, others)
     more = grown_from(grey, both, board, approach=approach)
     return more if more.sure.sum() > seen.sure.sum() else seen
+
+
+def _alternate(
+    contrast: Float[ndarray, " k"], fits: Bool[ndarray, " k"], cells: Int[ndarray, "k 2"]
+) -> Bool[ndarray, " k"]:
+    """Which corners have their bright squares where they must; those next to each other the other way round.
+
+    Where tags stand close a corner's neighbour, a true corner too, may be nearer than it is foreseen.
+    """
+    way = np.sign(contrast) * (1 - 2 * (cells.sum(1) % 2))
+    return way == (1 if way[fits].sum() > 0 else -1)
 
 
 def _inside(pixels: Float[ndarray, "m 2"], shape: tuple[int, ...]) -> Bool[ndarray, " m"]:
