@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from helpers.quick import first_quick
+from helpers.scenes import side_by_side
 from orthoscope.detection.recognition.recognise import recognise
 from orthoscope.geometry.arrays import CalibrationError
 from orthoscope.models.camera import Camera
@@ -14,6 +16,7 @@ from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.render import Renderer
 from orthoscope.simulation.scene import random_views
 from orthoscope.targets.table import parse_target
+from orthoscope.targets.target import Target
 
 CAMERA = Camera((640, 480), Intrinsics(560.0, 560.0, 320.0, 240.0), Brown(k1=-0.2, k2=0.05))
 RENDERER = Renderer(CAMERA)
@@ -54,26 +57,49 @@ def test_a_board_without_a_white_margin_is_known_by_the_size_that_comes_again():
         drawn = np.where(inside, cv2.warpPerspective(squares, plane, (640, 480)), 20)
         views[str(i)] = cv2.GaussianBlur(drawn.astype(np.uint8), (0, 0), 0.8)
     found = recognise(views)
-    assert found.target.name == "chessboard:9x6:25mm"
-    assert found.seen == 4
+    assert [target.name for target in found.targets] == ["chessboard:9x6:25mm"]
+    assert found.seen == (4,)
+
+
+def check_same(found: Target, said: Target) -> None:
+    """Checks that two descriptions are of one board, lengths as well as they can be seen."""
+    ours, theirs = (target.name.split(":") for target in (found, said))
+    for a, b in zip(ours, theirs, strict=False):
+        if a.removesuffix("mm").replace(".", "").isdecimal():
+            assert float(a.removesuffix("mm")) == pytest.approx(float(b.removesuffix("mm")), rel=0.08)
+        else:
+            assert a == b
+    rest = [{field for field in fields if not field[0].isdecimal()} for fields in (ours, theirs)]
+    assert rest[0] == rest[1]
 
 
 @pytest.mark.parametrize("spec", [*QUICK, *(pytest.param(spec, marks=pytest.mark.slow) for spec in SLOW)])
 def test_photographs_say_which_board_they_show(spec):
     found = recognise(photographs(spec, 1))
-    said, meant = parse_target(spec).board, found.target.board
-    assert said is not None
-    assert meant is not None
-    assert found.seen == found.looked_at == 1
-    assert meant.kind == said.kind
-    assert meant.grid == said.grid
-    ours, theirs = (board.description.split(":") for board in (meant, said))
-    for a, b in zip(ours, theirs, strict=False):
-        if a.removesuffix("mm").replace(".", "").isdecimal():
-            assert float(a.removesuffix("mm")) == pytest.approx(float(b.removesuffix("mm")), rel=0.06)
-        else:
-            assert a == b
-    assert {"legacy"} & set(ours) == {"legacy"} & set(theirs)
+    (target,) = found.targets
+    assert found.seen == (found.looked_at,) == (1,)
+    check_same(target, parse_target(spec))
+
+
+SEVERAL = {  # with the lengths that recognition takes
+    "squares and discs": "chessboard:6x5:25mm + chessboard:5x4:25mm + circles:3x7:20mm:asymmetric",
+    "two of one dictionary": "aprilgrid:4x3:30mm:0.3 + aprilgrid:4x3:30mm:0.3:first=12",
+    "two of one dictionary, chequered": (
+        "charuco:6x5:30mm:22mm:DICT_4X4_50 + charuco:6x5:30mm:22mm:DICT_4X4_50:first=15"
+    ),
+    "two dictionaries": "charuco:7x5:30mm:21mm:DICT_5X5_50 + aprilgrid:4x3:30mm:0.3",
+}
+
+
+@pytest.mark.parametrize("specs", first_quick(SEVERAL))
+def test_boards_in_one_photograph_are_told_each(specs):
+    target = parse_target(specs)
+    found = recognise(RENDERER.photograph_of(side_by_side(CAMERA, target, 0.2), rng=np.random.default_rng(0)))
+    ours, theirs = (sorted(some, key=lambda one: one.name) for some in (found.targets, target.members))
+    assert found.seen == (1,) * len(theirs)
+    for one, said in zip(ours, theirs, strict=True):
+        check_same(one, said)
+        assert f"--target {one.name}" in found.sentence
 
 
 def test_a_part_of_a_room_is_no_board():

@@ -10,11 +10,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from helpers.quick import first_quick
+from helpers.scenes import side_by_side
 from orthoscope.detection.detect import detect
 from orthoscope.evaluation.evaluate import evaluate
 from orthoscope.formats.own.json import load, save
 from orthoscope.geometry.arrays import InputError
-from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm
 from orthoscope.models.camera import Camera
@@ -43,27 +43,10 @@ APART = {
 }
 
 
-def side_by_side(target, turn: float) -> list[tuple]:
-    """Where the members stand, next to each other across the picture, each turned its own way."""
-    spans = [member.drawing().size for member in target.members]
-    distance = (
-        1.15 * 700.0 * max(sum(span[0] for span in spans) / 800.0, max(span[1] for span in spans) / 600.0)
-    )
-    left, stands = -0.5 * sum(span[0] for span in spans), []
-    for number, (member, span) in enumerate(zip(target.members, spans, strict=True)):
-        drawing = member.drawing()
-        rotation = rotation_from_vector(np.array([turn, 0.25 * (-1) ** number, 0.05 * number]))
-        middle = np.array([*(0.5 * (drawing.low + drawing.high)), 0.0])
-        at = np.array([left + 0.5 * span[0], 0.0, distance])
-        stands.append((member, Pose(rotation, at - rotation @ middle)))
-        left += span[0]
-    return stands
-
-
 @pytest.mark.parametrize("name", first_quick(APART))
 def test_each_of_several_targets_in_a_photograph_is_found_with_its_own_ids(name):
     target = parse_target(name)
-    stands = side_by_side(target, 0.2)
+    stands = side_by_side(CAMERA, target, 0.2)
     found = detect(RENDERER.photograph_of(stands, rng=np.random.default_rng(0)), target)
     assert [view.image for view in found.views] == [
         view_name("picture01", number) for number in range(len(target.members))
@@ -183,7 +166,7 @@ def test_shapes_have_no_similarity_of_either_target_and_no_pattern_over_both(sim
 )
 def test_of_two_boards_alike_the_choice_is_said(spec, tmp_path):
     board = parse_target(spec)
-    one, other = side_by_side(Target("twice", board.points, members=(board, board)), 0.1)
+    one, other = side_by_side(CAMERA, Target("twice", board.points, members=(board, board)), 0.1)
     found = detect(RENDERER.photograph_of([one, other], rng=np.random.default_rng(0)), board)
     assert len(found.views[0].ids) == len(board.points)
     ((image, words),) = found.remarks

@@ -17,8 +17,9 @@ from orthoscope.fitting.board_turns import turns_of
 from orthoscope.methods.decoupled.decoupled import decoupled
 from orthoscope.methods.fccm import fccm, fit_flat
 from orthoscope.models.target_shape import TargetShape, without_similarity
-from orthoscope.targets.detections import Detections, View
-from orthoscope.targets.target import Target, chessboard
+from orthoscope.targets.detections import Detections, View, view_name
+from orthoscope.targets.table import parse_target
+from orthoscope.targets.target import Target, chessboard, several
 
 ALIKE = {"half a turn": chessboard(8, 6, 0.025), "a quarter": chessboard(7, 7, 0.025)}
 for_every_alike = pytest.mark.parametrize("target", ALIKE.values(), ids=ALIKE.keys())
@@ -127,3 +128,46 @@ def test_many_views_of_which_few_are_turned_are_put_in_order():
     found = in_one_order(fit_flat(listed_from_elsewhere(right, {3: 1, 40: 1}), lens="brown"))
     for view, as_it_was in zip(found.detections.views, right.views, strict=True):
         assert_array_equal(view.ids, as_it_was.ids)
+
+
+def together(*parts: Detections) -> Detections:
+    """Views of several targets in the same photographs."""
+    target = several([part.target for part in parts])
+    views = [
+        View(view_name(f"{photograph}", number), parts[number].views[photograph].ids + first, view.pixels)
+        for photograph in range(len(parts[0].views))
+        for number, (first, view) in enumerate(
+            zip((part.start for part in target.parts), (one.views[photograph] for one in parts), strict=True)
+        )
+    ]
+    return Detections(target, parts[0].image_size, tuple(views))
+
+
+def test_each_of_several_boards_is_listed_from_one_end_of_its_own():
+    boards = chessboard(8, 6, 0.025), parse_target("circles:4x8:20mm:asymmetric"), chessboard(9, 6, 0.02)
+    right = [
+        photographed_with(shape_of(board), NARROW, 8, target=board, noise_px=0.1, seed=seed)
+        for seed, board in enumerate(boards)
+    ]
+    wrong = [
+        listed_from_elsewhere(right[0], {1: 1, 4: 1, 6: 1}),
+        listed_from_elsewhere(right[1], {0: 1, 4: 1}),
+        right[2],
+    ]
+    flat, expected = (fit_flat(together(*parts), lens="brown") for parts in (wrong, right))
+    found = in_one_order(flat)
+    for view, as_it_was in zip(found.detections.views, expected.detections.views, strict=True):
+        assert_array_equal(view.ids, as_it_was.ids)
+    points, camera = found.detections.target.points, found.camera
+    for view, pose in zip(found.detections.views, found.camera_from_target, strict=True):
+        misses = camera.project(pose.apply(points))[view.ids] - view.pixels
+        assert np.sqrt((misses**2).sum(1).mean()) < 3.0 * flat.rms_px  # each pose has turned with its view
+
+    shape = np.concatenate([shape_of(board) for board in boards])
+    seen = np.ones(len(shape), dtype=bool)
+    parts = found.detections.target.parts
+    known = TargetShape("free", without_similarity(points, shape, seen, parts=parts))
+    again = listed_as_known(NARROW, together(*wrong), known)
+    for view, as_it_was in zip(again.views, together(*right).views, strict=True):
+        assert_array_equal(np.sort(view.ids), as_it_was.ids)
+        assert_array_equal(view.pixels[np.argsort(view.ids)], as_it_was.pixels)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from helpers.discs import outlines_of
 from orthoscope.evaluation.evaluate import evaluate_on
 from orthoscope.fitting.disc_centres import at_disc_centres, disc_offsets, has_outlines
 from orthoscope.formats.own.json import load_detections, save
@@ -18,29 +19,12 @@ from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.models.lenses.table import Brown
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.circles import Circles
-from orthoscope.targets.detections import Detections, View
+from orthoscope.targets.detections import View
 from orthoscope.targets.target import target_of
 
 PIN_HOLE = Camera((1280, 960), Intrinsics(900.0, 900.0, 640.0, 480.0), Brown())
 BENT = replace(PIN_HOLE, lens=Brown(k1=-0.25, k2=0.08))
 TARGET = target_of(Circles(9, 7, 0.02, "symmetric", 0.014))
-
-
-def outlines_of(scene: Scene) -> Detections:
-    """What a detector of outlines without noise sees."""
-    exact = simulate_detections(scene, noise_px=0.0, rng=np.random.default_rng(0))
-    poses = dict(zip(scene.images, scene.camera_from_target, strict=True))
-    radius = scene.target.disc_radii
-    views = tuple(
-        View(
-            view.image,
-            view.ids,
-            view.pixels
-            + disc_offsets(scene.camera, poses[view.image], scene.target.points[view.ids], radius[view.ids]),
-        )
-        for view in exact.views
-    )
-    return replace(exact, views=views, disc_centres=False)
 
 
 @pytest.fixture(scope="module")

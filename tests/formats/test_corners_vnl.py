@@ -61,6 +61,19 @@ def test_the_table_of_mrcals_documentation_is_read(tmp_path):
     )
 
 
+@pytest.mark.parametrize("legend", ["", "filename,x,y,level\n", '"Filename","X","Y","Level"\n'])
+def test_a_table_with_commas_is_the_same(tmp_path, legend):
+    rows = [line.split() for line in MRCAL.splitlines() if line.startswith("frame")]
+    text = legend + "".join(",".join("" if word == "-" else word for word in row) + "\r\n" for row in rows)
+    (tmp_path / "corners.csv").write_text(text, newline="")
+    found, expected = read_vnl(tmp_path / "corners.csv", BOARD, SIZE), read(tmp_path, MRCAL)
+    for view, same in zip(found.views, expected.views, strict=True):
+        assert view.image == same.image
+        assert_array_equal(view.ids, same.ids)
+        assert_array_equal(view.pixels, same.pixels)
+    assert [entry.image for entry in found.set_aside] == [entry.image for entry in expected.set_aside]
+
+
 def test_corners_run_row_by_row(tmp_path):
     view = read(tmp_path, MRCAL).views[0]
     assert_allclose(view.pixels, BOARD.points[view.ids, :2] / 0.1, atol=1e-12)

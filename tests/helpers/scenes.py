@@ -17,7 +17,7 @@ from orthoscope.models.lenses.lens import Lens
 from orthoscope.models.lenses.table import Brown, KannalaBrandt
 from orthoscope.simulation.scene import Scene, random_views, simulate_detections
 from orthoscope.targets.detections import Detections, View
-from orthoscope.targets.target import chessboard
+from orthoscope.targets.target import Target, chessboard
 
 __all__ = [
     "BOARD",
@@ -29,6 +29,7 @@ __all__ = [
     "image_difference",
     "photographed",
     "seen",
+    "side_by_side",
     "some_corners",
     "turned_boards",
     "worst_image",
@@ -113,3 +114,19 @@ def turned_boards() -> tuple[np.ndarray, np.ndarray]:
     w = np.array([[0.0, 0.0, 0.0], [0.4, 0.1, 0.0], [-0.2, 0.5, 1.0], [0.1, -0.3, 3.0]])
     middle = np.array([[0.0, 0.0, 0.8], [0.05, 0.0, 0.9], [-0.05, 0.05, 0.8], [0.0, -0.05, 1.0]])
     return w, middle - np.einsum("vij,j->vi", rotation_from_vector(w), BOARD.points.mean(0))
+
+
+def side_by_side(camera: Camera, target: Target, turn: float) -> list[tuple[Target, Pose]]:
+    """Where the members of a target stand, next to each other across the picture, each turned its own way."""
+    spans = [member.drawing().size for member in target.members]
+    (width, height), fx = camera.image_size, camera.intrinsics.fx
+    share = max(sum(span[0] for span in spans) / width, max(span[1] for span in spans) / height)
+    distance, left, stands = 1.15 * fx * share, -0.5 * sum(span[0] for span in spans), []
+    for number, (member, span) in enumerate(zip(target.members, spans, strict=True)):
+        drawing = member.drawing()
+        rotation = rotation_from_vector(np.array([turn, 0.25 * (-1) ** number, 0.05 * number]))
+        middle = np.array([*(0.5 * (drawing.low + drawing.high)), 0.0])
+        at = np.array([left + 0.5 * span[0], 0.0, distance])
+        stands.append((member, Pose(rotation, at - rotation @ middle)))
+        left += span[0]
+    return stands

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from orthoscope.cli.shared import options
-from orthoscope.cli.shared.printing import tell, tell_json, tell_of_earlier
+from orthoscope.cli.shared.printing import tell, tell_json, tell_of_earlier, tell_remarks
 
 __all__ = ["calibrate", "calibrate_into"]
 
@@ -26,7 +26,7 @@ Example:
   wrote      camera/detections.json, camera/calibration.json, camera/evaluation.json, camera/report.html
 
 \b
-PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+PHOTOS are files, folders and globs; or one detections.json, corners.vnl or corners.csv.
 Exit: 0 done, 1 the photographs cannot tell the camera, 2 the command is wrong,
 3 with --strict: the camera must not be used.
 """
@@ -158,8 +158,7 @@ def calibrate_into(
         detections, files = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress, topic=topic
         )
-    for remark in detections.remarks:
-        tell(f"remark     {remark.image}: {remark.words}", err=True)
+    tell_remarks(detections)
     save(detections, out / "detections.json")
     written = [out / "detections.json"]
     detections = left_out(detections, without) if without else detections

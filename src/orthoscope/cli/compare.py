@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from orthoscope.cli.shared import options
-from orthoscope.cli.shared.printing import tell, tell_json
+from orthoscope.cli.shared.printing import tell, tell_json, tell_remarks
 
 if TYPE_CHECKING:
     from orthoscope.evaluation.comparison.compare import Comparison
@@ -34,7 +34,7 @@ Example:
 \b
 comparison.svg, for print, is written where matplotlib is installed (pip install 'orthoscope[figures]').
 WHO is METHOD, METHOD:LENS or either with settings of the method's own, such as fccm:brown:k1,k2 or
-decoupled:brown:shape=flat; or a camera's file, whose camera stays as it is. PHOTOS are files, folders and globs; or one detections.json or corners.vnl.
+decoupled:brown:shape=flat; or a camera's file, whose camera stays as it is. PHOTOS are files, folders and globs; or one detections.json, corners.vnl or corners.csv.
 Exit: 0 done, 1 the photographs are too few to hold any out, 2 the command is wrong.
 """
 HEADINGS = ("", "held out (px)", "loses (px)", "NCE", "used (px)", "parameters", "seconds", "lens", "target")
@@ -97,6 +97,7 @@ def compare(
         detections, _ = detections_from(
             photos, target, image_size=image_size, executor=executor, progress=progress
         )
+    tell_remarks(detections)
     with processes(jobs, cluster) as executor, bar("comparing") as progress:
         comparison = judge(detections, entries, folds=folds, executor=executor, progress=progress)
     texts = {

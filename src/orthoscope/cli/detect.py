@@ -52,9 +52,9 @@ def detect(
     out: Path,
     as_json: bool,
 ) -> None:
-    """Find the target's corners in photographs (or turn a corners.vnl table into detections.json).
+    """Find the target's corners in photographs (or turn a corners.vnl or corners.csv into detections.json).
 
-    With --target auto say which target the photographs show, and write nothing.
+    With --target auto say which target the photographs show, of several each, and write nothing.
     """
     from orthoscope.cli.shared.executors import threads
     from orthoscope.cli.shared.inputs import AUTO, detections_from
@@ -94,12 +94,15 @@ def detect(
 
 
 def _recognise(photos: tuple[str, ...], *, as_json: bool) -> None:
-    """Say which target photographs show."""
+    """Say which targets photographs show."""
     from orthoscope.detection.recognition.recognise import recognise
+    from orthoscope.targets.target import TOGETHER
 
     found = recognise(photos)
     if as_json:
-        numbers = {"target": found.target.name, "seen": found.seen, "looked_at": found.looked_at}
-        tell_json(json.dumps(numbers, indent=2))
+        names = [target.name for target in found.targets]
+        each = [{"target": name, "seen": seen} for name, seen in zip(names, found.seen, strict=True)]
+        told = {"target": TOGETHER.join(names), "seen": found.seen[-1], "looked_at": found.looked_at}
+        tell_json(json.dumps(told | {"targets": each}, indent=2))
         return
-    tell(f"target     {found.target.name}", f"seen       {found.sentence}")
+    tell(*(f"target     {target.name}" for target in found.targets), f"seen       {found.sentence}")

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from orthoscope.cli.shared import options
-from orthoscope.cli.shared.printing import tell, tell_json
+from orthoscope.cli.shared.printing import tell, tell_json, tell_remarks
 
 __all__ = ["evaluate"]
 
@@ -94,6 +94,7 @@ def evaluate(
         detections, _ = detections_from(
             others, board, image_size=image_size, executor=executor, progress=progress
         )
+    tell_remarks(detections)
     found = on_others(loaded, detections, own_board=not target)
     if as_json:
         tell_json(to_json(json_of(found)))

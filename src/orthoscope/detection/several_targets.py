@@ -12,10 +12,10 @@ import numpy as np
 
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.table import see
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import ndarray
 from orthoscope.targets.target import Target
 
-__all__ = ["see_members"]
+__all__ = ["painted_over", "see_members"]
 
 # A board reaches beyond its corners by about so many of the steps between them.
 MARGIN = 1.3
@@ -39,7 +39,7 @@ def see_members(grey: ndarray, target: Target) -> list[Sight | Unseen]:
         marked = member.board and member.board.markers
         sight = found[number] = see(grey if marked else painted, member)
         if isinstance(sight, Sight):
-            painted = _painted_over(painted, sight.pixels, _step(member, sight))
+            painted = painted_over(painted, member, sight)
             found[number] = sight._replace(ids=sight.ids + target.parts[number].start)
     return [found[number] for number in range(len(target.members))]
 
@@ -57,14 +57,19 @@ def _step(member: Target, sight: Sight) -> float:
     return float(np.linalg.norm(sight.pixels - sight.pixels[apart.argmin(1)], axis=-1).max())
 
 
-def _painted_over(grey: ndarray, pixels: Float[ndarray, "n 2"], step: float) -> ndarray:
-    """The picture with the board at these corners grey and even."""
-    hull = cv2.convexHull(pixels.astype(np.float32)).reshape(-1, 2)
+def painted_over(grey: ndarray, member: Target, sight: Sight) -> ndarray:
+    """The picture with a board that was found in it grey and even.
+
+    Args:
+        grey: (h,w) uint8.
+        member: the board.
+        sight: of it.
+    """
+    outline = np.rint(cv2.convexHull(sight.pixels.astype(np.float32)).reshape(-1, 2)).astype(np.int32)
     mask = np.zeros(grey.shape, np.uint8)
-    cv2.fillConvexPoly(mask, np.rint(hull).astype(np.int32), 1)
+    cv2.fillConvexPoly(mask, outline, 1)
     level = int(grey[mask > 0].mean()) if mask.any() else 128
     painted = grey.copy()
-    outline = np.rint(hull).astype(np.int32)
     cv2.fillConvexPoly(painted, outline, level)
-    cv2.polylines(painted, [outline], True, level, max(1, round(2 * MARGIN * step)))
+    cv2.polylines(painted, [outline], True, level, max(1, round(2 * MARGIN * _step(member, sight))))
     return painted

@@ -26,6 +26,7 @@ from orthoscope.evaluation.unseen_views import in_folds, in_turn
 from orthoscope.evaluation.verdict.facts import Findings, situation_of
 from orthoscope.evaluation.verdict.situation import NOTHING_KNOWN, Situation
 from orthoscope.evaluation.verdict.verdict import Verdict, verdict_on
+from orthoscope.fitting.board_order import listed_as_known
 from orthoscope.fitting.calibration import Calibration, residuals_of, rms
 from orthoscope.fitting.disc_centres import at_disc_centres, has_outlines
 from orthoscope.fitting.fits import Fits
@@ -119,7 +120,8 @@ class UnseenError:
 
 @with_one_thread
 def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | None = None) -> UnseenError:
-    """The error of a camera on other photographs: the camera stays fixed, the pose of each view is fitted.
+    """The error of a camera on other photographs: the camera stays fixed, the pose of each view is fitted. A
+    board that looks the same upside down is taken from the end that its shape fits.
 
     Args:
         shape: of the target, where it is known and these photographs show the same one.
@@ -128,7 +130,7 @@ def evaluate_on(camera: Camera, detections: Detections, *, shape: TargetShape | 
         CalibrationError: no view can be used.
     """
     check_image_size(camera, detections.image_size)
-    used = with_usable_views(detections)
+    used = listed_as_known(camera, with_usable_views(detections), shape)
     poses = resect(camera, used, shape=shape)
     if has_outlines(used):
         used = at_disc_centres(used, camera, poses, [view.image for view in used.views], shape=shape)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.fitting.board_order import listed_as_known
 from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.resection import resect
 from orthoscope.geometry.arrays import ndarray
@@ -65,5 +66,6 @@ def same_board(camera: Camera, shape: TargetShape, detections: Detections) -> Sa
 
 def _squares(camera: Camera, detections: Detections, shape: TargetShape | None) -> ndarray:
     """Of each view, its pose fitted, px^2."""
+    detections = listed_as_known(camera, detections, shape)
     poses = resect(camera, detections, shape=shape)
     return np.array([float((e**2).sum()) for e in residuals_of(camera, poses, detections, shape=shape)])

@@ -16,11 +16,19 @@ look (turn_gain.py) says first whether any turns can gain so much.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orthoscope.fitting.board_turns import Turn, least_turned, shown_by, turns_after, turns_of
+from orthoscope.fitting.board_turns import (
+    Turn,
+    least_turned,
+    shown_by,
+    turns_after,
+    turns_of,
+    whole_turn,
+)
 from orthoscope.fitting.calibration import Calibration, residuals_of
 from orthoscope.fitting.observations import Observations
 from orthoscope.fitting.resection import resect
@@ -56,35 +64,70 @@ ROUND_LIMIT = 20
 
 def in_one_order(flat: Calibration) -> Calibration:
     """The calibration with a flat target, the corners of all views listed from the same end of the target;
-    poses turn with them.
+    poses turn with them. Of several targets each has its own end.
     """
-    turns = turns_of(flat.detections.target)
-    if (
-        len(turns) < 2
-        or len(flat.detections.views) < FEWEST_ORDERED_VIEWS
-        or flat.camera.lens_frame is not None
-    ):
+    if flat.camera.lens_frame is not None:
         return flat
-    if len(flat.detections.views) >= QUICK_LOOK_VIEWS and not _may_gain(flat, turns):
-        return flat
-    chosen = _chosen(_Sums.of(flat, turns))
-    if not chosen.any():
-        return flat
-    views, poses = [], []
-    middle = flat.detections.target.points.mean(0)
-    for view, pose, turn in zip(flat.detections.views, flat.camera_from_target, chosen, strict=True):
-        back = turns[turn]
-        ids = back.corners[view.ids]
+    turned = {}
+    for rows, alone in _alone(flat):
+        turns = turns_of(alone.detections.target)
+        turned |= {row: turns[i] for row, i in zip(rows.tolist(), _chosen_of(alone, turns), strict=True) if i}
+    return _turned(flat, turned) if turned else flat
+
+
+def _shown(detections: Detections, view: View) -> int:
+    """The number of the target's member that a view shows."""
+    return int(detections.member_of(view.ids[:1])[0])
+
+
+def _alone(flat: Calibration) -> Iterator[tuple[Int[ndarray, " v"], Calibration]]:
+    """The calibration of each member by the views that show it, and which these are."""
+    target, views = flat.detections.target, flat.detections.views
+    if not target.members:
+        yield np.arange(len(views)), flat
+        return
+    shows = np.array([_shown(flat.detections, view) for view in views])
+    for number, (part, member) in enumerate(zip(target.parts, target.members, strict=True)):
+        rows = np.flatnonzero(shows == number)
+        mine = replace(
+            flat.detections,
+            target=replace(member, points=target.points[part]),
+            views=tuple(replace(views[row], ids=views[row].ids - part.start) for row in rows),
+            set_aside=(),
+            outliers=(),
+            remarks=(),
+        )
+        poses = tuple(flat.camera_from_target[row] for row in rows)
+        yield rows, replace(flat, detections=mine, camera_from_target=poses, target_shape=None)
+
+
+def _chosen_of(flat: Calibration, turns: list[Turn]) -> Int[ndarray, " m"]:
+    """The turn of each view, 0 where it stays."""
+    views = len(flat.detections.views)
+    if len(turns) < 2 or views < FEWEST_ORDERED_VIEWS:
+        return np.zeros(views, dtype=np.int64)
+    if views >= QUICK_LOOK_VIEWS and not _may_gain(flat, turns):
+        return np.zeros(views, dtype=np.int64)
+    return _chosen(_Sums.of(flat, turns))
+
+
+def _turned(flat: Calibration, turned: dict[int, Turn]) -> Calibration:
+    """The same with some views listed another way, by their numbers; outliers and poses turn with them."""
+    target = flat.detections.target
+    views, poses = list(flat.detections.views), list(flat.camera_from_target)
+    corners_of = {}
+    for row, back in turned.items():
+        view, pose, part = views[row], poses[row], target.parts[_shown(flat.detections, views[row])]
+        corners = corners_of[view.image] = whole_turn(target, part, back)
+        ids, middle = corners[view.ids], target.points[part].mean(0)
         order = np.argsort(ids)
-        views.append(View(view.image, ids[order], view.pixels[order]) if turn else view)
+        views[row] = View(view.image, ids[order], view.pixels[order])
         rotation = pose.rotation @ back.rotation.T
-        shift = pose.translation + pose.rotation @ middle - rotation @ middle
-        poses.append(Pose(rotation, shift) if turn else pose)
-    outliers = []
-    turned = dict(zip((view.image for view in views), chosen, strict=True))
-    for outlier in flat.detections.outliers:
-        corners = turns[turned.get(outlier.image, 0)].corners
-        outliers.append(outlier._replace(id=int(corners[outlier.id])))
+        poses[row] = Pose(rotation, pose.translation + pose.rotation @ middle - rotation @ middle)
+    outliers = [
+        one._replace(id=int(corners_of[one.image][one.id])) if one.image in corners_of else one
+        for one in flat.detections.outliers
+    ]
     detections = replace(flat.detections, views=tuple(views), outliers=tuple(outliers))
     return replace(flat, detections=detections, camera_from_target=tuple(poses))
 
@@ -109,13 +152,23 @@ def listed_as_known(camera: Camera, detections: Detections, shape: TargetShape |
         camera: that took them.
         shape: of the target.
     """
-    turns = turns_of(detections.target)
-    if len(turns) < 2 or shape is None or not shape.displacements.any():
+    if shape is None or not shape.displacements.any():
         return detections
-    views = []
+    target, views = detections.target, []
+    turns = [
+        [whole_turn(target, part, turn) for turn in turns_of(member)]
+        for part, member in zip(target.parts, target.members or (target,), strict=True)
+    ]
+    if all(len(ways) == 1 for ways in turns):
+        return detections
     for view in detections.views:
-        listed = [replace(view, ids=turn.corners[view.ids]) for turn in turns]
-        views.append(min(listed, key=lambda one: _misses(camera, replace(detections, views=(one,)), shape)))
+        ways = turns[_shown(detections, view)]
+        listed = [replace(view, ids=corners[view.ids]) for corners in ways]
+        views.append(
+            min(listed, key=lambda one: _misses(camera, replace(detections, views=(one,)), shape))
+            if len(listed) > 1
+            else view
+        )
     return replace(detections, views=tuple(views))
 
 

@@ -10,7 +10,7 @@ from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.pose import nearest_rotation
 from orthoscope.targets.target import Target
 
-__all__ = ["Turn", "least_turned", "shown_by", "turns_after", "turns_of"]
+__all__ = ["Turn", "least_turned", "shown_by", "turns_after", "turns_of", "whole_turn"]
 
 # Points nearer than this share of the target's size are one.
 SAME_SHARE = 1e-6
@@ -50,6 +50,13 @@ def _fits(turn: Turn, points: Float[ndarray, "p 3"]) -> bool:
     return bool(
         np.abs(points @ turn.rotation.T - points[turn.corners]).max() < SAME_SHARE * np.ptp(points[:, :2])
     )
+
+
+def whole_turn(target: Target, part: slice, turn: Turn) -> Int[ndarray, " p"]:
+    """Which corner of the whole target each one comes to lie on where a member's, those of `part`, turn."""
+    corners = np.arange(len(target.points))
+    corners[part] = part.start + turn.corners
+    return corners
 
 
 def shown_by(turn: Turn, smooth: Float[ndarray, "p r"], named: int) -> Float[ndarray, "c c"]:

@@ -11,6 +11,8 @@ single line of dashes where no board was found. The fourth column is `level` (ho
 to find the corner) or `weight`; its size is not used here. A corner counts as not found, as in mrcal, where
 x, y or that column is a dash, where x, y or the level is negative, or the weight not positive. Pixels as
 ours: (0, 0) is the centre of the first. mrcal: doc/how-to-calibrate.org, mrcal/calibration.py.
+
+A corners.csv is the same with commas, and its legend, if it has one, without the #.
 """
 
 from __future__ import annotations
@@ -25,10 +27,14 @@ import numpy as np
 
 from orthoscope.files.whole_files import read_text, write_text
 from orthoscope.geometry.arrays import InputError, ndarray
-from orthoscope.targets.detections import Detections, Remark, SetAside, View
+from orthoscope.targets.detections import Detections, SetAside, View
+from orthoscope.targets.mirrored import with_word_of_mirrors
 from orthoscope.targets.target import Target
 
-__all__ = ["read_vnl", "write_vnl"]
+__all__ = ["SUFFIXES", "read_vnl", "write_vnl"]
+
+# Files of such tables end so.
+SUFFIXES = (".vnl", ".csv")
 
 LEGEND = ["filename", "x", "y", "level"]
 PRESENT = {
@@ -52,17 +58,18 @@ class _Table(NamedTuple):
 
 
 def read_vnl(path: str | Path, target: Target, image_size: tuple[int, int]) -> Detections:
-    """The corners of a corners.vnl file as detections.
+    """The corners of a corners.vnl or corners.csv file as detections.
 
     Args:
-        path: of the file.
+        path: of the file, which says by its ending which of them it is.
         target: whose corners they are.
         image_size: of the photographs, (width, height) pixels.
     Raises:
         InputError: the table is none, an image has another number of corners than the target or is there
             twice, or a corner lies outside the image; the line is named.
     """
-    table = _table(read_text(path), path)
+    text = read_text(path)
+    table = _table(_without_commas(text) if Path(path).suffix.lower() == ".csv" else text, path)
     starts = [0, *compress(count(1), map(ne, table.images, table.images[1:]))]
     _check_once(table, starts, path)
     _check_inside(table, image_size, path)
@@ -80,28 +87,7 @@ def read_vnl(path: str | Path, target: Target, image_size: tuple[int, int]) -> D
                 f" corners; target {target.name!r} has {len(target.points)}. Name the target that was"
                 " photographed, counting inner corners."
             )
-    return Detections(target, image_size, tuple(views), tuple(set_aside), remarks=_if_mirrored(views, target))
-
-
-def _if_mirrored(views: list[View], target: Target) -> tuple[Remark, ...]:
-    """A remark where most views are mirror images of a board whose front is known."""
-    if target.board is None or target.members:
-        return ()
-    mirrored = [view for view in views if len(view.ids) > 3 and _turning(view, target) < 0]
-    if 2 * len(mirrored) <= len(views):
-        return ()
-    words = (
-        f"a mirror image of {target.name}, as are {len(mirrored)} of {len(views)} views; expected it as seen"
-        " from the front. See that x and y are not swapped, and that corners of a row run from left to right"
-    )
-    return (Remark(mirrored[0].image, words),)
-
-
-def _turning(view: View, target: Target) -> float:
-    """Positive where the target's y lies clockwise of its x in the image, as on the front of a board."""
-    points = target.points[view.ids, :2]
-    axes = np.linalg.lstsq(points - points.mean(0), view.pixels - view.pixels.mean(0), rcond=None)[0]
-    return float(np.linalg.det(axes))
+    return with_word_of_mirrors(Detections(target, image_size, tuple(views), tuple(set_aside)))
 
 
 def write_vnl(detections: Detections, path: str | Path) -> None:
@@ -119,6 +105,18 @@ def write_vnl(detections: Detections, path: str | Path) -> None:
         lines += [f"{name} {row}" for row in rows]
     lines += [f"{_checked_name(image)} - - -" for image, _ in detections.set_aside]
     write_text(path, "\n".join(lines) + "\n")
+
+
+def _without_commas(text: str) -> str:
+    """A table with commas as one with blanks, line by line; what is empty is a dash."""
+    lines = [
+        " ".join(cell.strip(' "\r') or "-" for cell in line.split(",")) if "," in line else line
+        for line in text.split("\n")
+    ]
+    words = lines[0].removeprefix("\ufeff").split()
+    if words and not words[0].startswith("#") and set(LEGEND[:3]) <= {word.lower() for word in words}:
+        lines[0] = f"# {' '.join(words).lower()}"
+    return "\n".join(lines)
 
 
 def _table(text: str, path: str | Path) -> _Table:

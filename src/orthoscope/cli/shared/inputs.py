@@ -1,4 +1,5 @@
-"""Whatever holds corners, to Detections: photographs, our own detections.json, or a corners.vnl table.
+"""Whatever holds corners, to Detections: photographs, our own detections.json, or a table of
+corners.
 
 OpenCV is loaded for photographs only.
 """
@@ -10,7 +11,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 
 from orthoscope.cli.shared.printing import tell
-from orthoscope.formats.corners_vnl import read_vnl
+from orthoscope.formats.corners_vnl import SUFFIXES, read_vnl
 from orthoscope.formats.own.json import load_detections
 from orthoscope.geometry.arrays import InputError
 from orthoscope.targets.detections import Detections, photograph_of
@@ -37,9 +38,9 @@ def detections_from(
     """Detections, and where the photograph of each name is (empty where corners were found before).
 
     Args:
-        paths: photographs (files, folders, globs), or one .json of ours, or one .vnl.
+        paths: photographs (files, folders, globs), or one .json of ours, or one .vnl or .csv.
         target: needed but for our own file, which knows its own.
-        image_size: needed with a .vnl, which does not know it.
+        image_size: needed with a table, which does not know it.
         jobs, executor, progress: as in `detect`.
     Raises:
         InputError: something needed is missing, or contradicts the photographs.
@@ -59,7 +60,7 @@ def detections_from(
 
         raise InputError(f"--target {AUTO} only says what is seen: {recognise(paths).sentence}.")
     target = parse_target(target) if isinstance(target, str) else target
-    if len(paths) == 1 and Path(paths[0]).suffix == ".vnl":
+    if len(paths) == 1 and Path(paths[0]).suffix.lower() in SUFFIXES:
         if image_size is None:
             raise InputError(
                 f"{paths[0]} does not say how large the photographs are; add their size, such as --image-size"
@@ -95,8 +96,8 @@ def _check_same_size(found: Detections, image_size: tuple[int, int] | None) -> N
     if image_size not in (None, tuple(found.image_size)):
         (width, height), (w, h) = found.image_size, image_size
         raise InputError(
-            f"the photographs are {width}x{height}; --image-size says {w}x{h}. Leave it out: only a .vnl table"
-            " does not know its size."
+            f"the photographs are {width}x{height}; --image-size says {w}x{h}. Leave it out: only a table of"
+            " corners does not know its size."
         )
 
 

@@ -173,7 +173,7 @@ topic: Decorator = click.option(
 image_size: Decorator = click.option(
     "--image-size",
     type=SIZE,
-    help="Size of the photographs; needed with a corners.vnl table or a simulated lens only.",
+    help="Size of the photographs; needed with a table of corners or a simulated lens only.",
 )
 lens: Decorator = click.option(
     "--lens",

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from orthoscope.files.printable import printable, printable_json
 
-__all__ = ["tell", "tell_json", "tell_of_earlier"]
+if TYPE_CHECKING:
+    from orthoscope.targets.detections import Detections
+
+__all__ = ["tell", "tell_json", "tell_of_earlier", "tell_remarks"]
 
 # So many files of earlier runs are named.
 LISTED_FILES = 5
@@ -23,6 +27,11 @@ def tell(*lines: str, err: bool = False) -> None:
     """
     for line in lines:
         click.echo(printable(line), err=err)
+
+
+def tell_remarks(detections: Detections) -> None:
+    """Print what to know of how photographs were seen, to stderr."""
+    tell(*(f"remark     {remark.image}: {remark.words}" for remark in detections.remarks), err=True)
 
 
 def tell_json(text: str) -> None:

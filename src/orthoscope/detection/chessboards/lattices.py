@@ -16,7 +16,7 @@ import numpy as np
 from orthoscope.detection.saddles.saddle_points import SaddlePoints
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
-__all__ = ["CornerLattice", "lattices"]
+__all__ = ["LONGEST_STEP", "CornerLattice", "lattices"]
 
 # So many of the nearest corners may be neighbours.
 NEIGHBOUR_CANDIDATES = 16
@@ -48,11 +48,16 @@ class CornerLattice(NamedTuple):
         return int(columns), int(rows)
 
 
-def lattices(points: SaddlePoints) -> list[CornerLattice]:
-    """What hangs together, the most corners first."""
+def lattices(points: SaddlePoints, longest_step: float = LONGEST_STEP) -> list[CornerLattice]:
+    """What hangs together, the most corners first.
+
+    Args:
+        points: corners of four squares.
+        longest_step: a link is at most so many times as long as the next one of its line.
+    """
     if len(points.pixels) < FEWEST_LATTICE_CORNERS:
         return []
-    links = _single_steps(_mutual(_neighbours(points)), points.pixels)
+    links = _single_steps(_mutual(_neighbours(points)), points.pixels, longest_step)
     left, count = np.ones(len(links), dtype=bool), (links >= 0).sum(1)
     listed, edges = links.tolist(), points.edges.tolist()
     found = []
@@ -97,12 +102,14 @@ def _mutual(links: Int[ndarray, "n 4"]) -> Int[ndarray, "n 4"]:
     return np.where((links >= 0) & back, links, -1)
 
 
-def _single_steps(links: Int[ndarray, "n 4"], pixels: Float[ndarray, "n 2"]) -> Int[ndarray, "n 4"]:
+def _single_steps(
+    links: Int[ndarray, "n 4"], pixels: Float[ndarray, "n 2"], longest: float
+) -> Int[ndarray, "n 4"]:
     """The links without those that leap over corners that are not seen, as behind a mark: they are much
     longer than the next link of their line.
     """
     length = np.where(links >= 0, np.linalg.norm(pixels[links] - pixels[:, None], axis=-1), np.inf)
-    return _mutual(np.where(length > LONGEST_STEP * np.roll(length, 2, axis=1), -1, links))
+    return _mutual(np.where(length > longest * np.roll(length, 2, axis=1), -1, links))
 
 
 def _spread(

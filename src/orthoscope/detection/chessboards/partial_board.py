@@ -29,6 +29,7 @@ __all__ = [
     "grid_of",
     "is_even",
     "laid_out",
+    "on_lines",
     "placements",
     "without_lost_lines",
     "without_strays",
@@ -93,18 +94,31 @@ def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
     seen = np.isfinite(corners[..., 0])
     seen &= _stands(grey, filled(corners), bright)
     corners[~seen] = np.nan
-    box = _box(seen)
-    if box is None:
+    boxed = _boxed(corners, bright)
+    if boxed is None:
         return None
-    bright ^= bool((box[0].start + box[1].start) % 2)
-    grid, seen = filled(corners[box]), seen[box]
-    seen |= _stands(grey, grid, bright)
+    corners, bright = boxed
+    grid = filled(corners)
+    seen = np.isfinite(corners[..., 0]) | _stands(grey, grid, bright)
     part = plain_part(grey, grid, seen, bright)
     if part is None:
         return None
-    bright ^= bool((part[0].start + part[1].start) % 2)
-    grid, seen = grid[part], seen[part]
+    if part != tuple(slice(0, count) for count in seen.shape):  # what foresaw its gaps may be gone
+        bright ^= bool((part[0].start + part[1].start) % 2)
+        boxed = _boxed(np.where(seen[..., None], grid, np.nan)[part], bright)
+        if boxed is None:
+            return None
+        corners, bright = boxed
+        grid, seen = filled(corners), np.isfinite(corners[..., 0])
     return _taken_further(grey, grid, seen, bright, most)
+
+
+def _boxed(
+    corners: Float[ndarray, "r c 2"], bright: bool
+) -> tuple[Float[ndarray, "rows columns 2"], bool] | None:
+    """The rows and columns with corners, and whether their first square is the bright one; None without."""
+    box = _box(np.isfinite(corners[..., 0]))
+    return (corners[box], bright ^ bool((box[0].start + box[1].start) % 2)) if box else None
 
 
 def placements(grid: Grid, columns: int, rows: int, *, negative: bool = False) -> list[Int[ndarray, "r c"]]:
@@ -209,18 +223,31 @@ def _foreseen(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "12 r c 2"]:
 
 
 def without_strays(found: CornerLattice) -> CornerLattice | None:
-    """The lattice without corners that are off their neighbours' lines, the worst first."""
-    pixels, cells, bright = found
+    """The lattice without corners that are off their neighbours' lines; None where hardly any is left."""
+    keep = on_lines(found.pixels, found.cells.astype(float))
+    if keep is None:
+        return None
+    cells = found.cells[keep]
+    return CornerLattice(found.pixels[keep], cells - cells.min(0), found.bright[keep])
+
+
+def on_lines(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"] | None:
+    """Which corners of a lattice are on their neighbours' lines, the worst taken out first; None where hardly
+    any is.
+
+    Args:
+        pixels: the corners.
+        places: column and row of each in the lattice, in steps.
+    """
+    keep = np.arange(len(pixels))
     for _ in range(CLEARING_ROUNDS):
-        if len(pixels) < max(4, LEAST_LEFT_SHARE * len(found.pixels)):
+        if len(keep) < max(4, LEAST_LEFT_SHARE * len(pixels)):
             return None
-        stray = grid_shape(pixels, cells.astype(float)).stray
+        stray = grid_shape(pixels[keep], places[keep]).stray
         if stray.max() <= FARTHEST_STRAY_SHARE:
             break
-        keep = stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())
-        pixels, cells, bright = pixels[keep], cells[keep], bright[keep]
-    cells = cells - cells.min(0)
-    return CornerLattice(pixels, cells, bright)
+        keep = keep[stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())]
+    return np.isin(np.arange(len(pixels)), keep)
 
 
 def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:

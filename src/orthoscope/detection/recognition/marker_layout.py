@@ -20,6 +20,7 @@ import numpy as np
 
 from orthoscope.detection.markers.marker_corners import crossings_of_sides
 from orthoscope.detection.markers.markers import Markers, homography_of
+from orthoscope.detection.recognition.marker_groups import are_on_one_plane, groups
 from orthoscope.detection.small_copies import resized
 from orthoscope.geometry.arrays import Float, InputError, Int, ndarray
 from orthoscope.targets.aprilgrid import BORDER_SQUARES, DICTIONARY, AprilGrid
@@ -78,8 +79,20 @@ class _Neighbours(NamedTuple):
     away: Float[ndarray, "k 2"]
 
 
-def marker_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
-    """The board that the markers of photographs (h,w) make, if they make one."""
+class _LaidOut(NamedTuple):
+    """A board, and where its layout has the markers of some numbers, in pitches or squares."""
+
+    board: Board
+    layout: Layout
+
+
+def marker_boards(greys: Sequence[ndarray], *, others: Sequence[Board] = ()) -> Iterator[Board]:
+    """The boards that the markers of photographs make, if they make any: of one dictionary.
+
+    Args:
+        greys: (h,w) uint8.
+        others: boards that are known; their markers are none of these.
+    """
     copies = [resized(grey, COPY_SIDE) for grey in greys]
     family, border = _family(copies)
     if not family:
@@ -87,7 +100,10 @@ def marker_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
     read = [_read(copy, family[0], border) for copy in copies[:TRIED_PHOTOGRAPHS]]
     highest = max((int(markers.numbers.max(initial=0)) for markers in read), default=0)
     read += [_read(copy, _smallest(family, highest), border) for copy in copies[TRIED_PHOTOGRAPHS:]]
-    numbers = _known(read)
+    taken = [
+        one for board in others if board.markers and board.markers[0] in family for one in board.markers[1]
+    ]
+    numbers = np.setdiff1d(_known(read), taken)
     if len(numbers) < FEWEST_MARKERS:
         return
     modules = int(dictionary(family[0]).markerSize) + 2 * border
@@ -95,16 +111,19 @@ def marker_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
         Markers(markers.numbers, crossings_of_sides(copy, markers.corners, modules)[0])
         for copy, markers in zip(copies, read, strict=True)
     ]
-    name = _smallest(family, int(numbers.max()))
-    near = _neighbours(read, numbers)
-    if not len(near.here):
+    lowest = max((one + 1 for one in taken if one < numbers.min()), default=0)
+    laid = _laid_out(read, numbers, family, border, lowest)
+    if laid and are_on_one_plane(read, laid.layout):
+        yield laid.board
         return
-    try:
-        board = _laid_out(near, numbers, name, border)
-    except InputError:  # what it seems to be cannot be
-        return
-    if board:
-        yield board
+    parts = groups(read, numbers)
+    if len(parts) > 1:
+        several = [
+            _laid_out(read, part, family, border, lowest) for part in parts if len(part) >= FEWEST_MARKERS
+        ]
+        yield from (one.board for one in several if one)
+    elif laid:
+        yield laid.board
 
 
 def marker_alone(copy: ndarray) -> tuple[str, int, Float[ndarray, "4 2"]] | None:
@@ -187,23 +206,41 @@ def _neighbours(read: Sequence[Markers], numbers: Int[ndarray, " n"]) -> _Neighb
     return _Neighbours(np.array(here, dtype=int), np.array(there, dtype=int), np.array(away).reshape(-1, 2))
 
 
-def _laid_out(near: _Neighbours, numbers: Int[ndarray, " n"], name: str, border: int) -> Board | None:
-    """The board whose layout has most neighbours where they are seen."""
+def _laid_out(
+    read: Sequence[Markers],
+    numbers: Int[ndarray, " n"],
+    family: tuple[str, ...],
+    border: int,
+    lowest: int,
+) -> _LaidOut | None:
+    """The board whose layout has most neighbours where they are seen. It begins with the lowest number that
+    it may have, or the lowest that is seen.
+    """
+    near = _neighbours(read, numbers)
+    if not len(near.here):
+        return None
+    name = _smallest(family, int(numbers.max()))
     far = np.hypot(*near.away.T)
     pitch, most = float(np.median(far[far < 1.2 * far.min()])), int(numbers.max())
     square = pitch / np.sqrt(2.0)
-    tried: list[tuple[float, Callable[[], Board]]] = []
-    for first in dict.fromkeys((0, int(numbers.min()))):
+    tried: list[tuple[float, Layout, Callable[[], Board]]] = []
+    for first in dict.fromkeys((lowest, int(numbers.min()))):
         for columns in range(1, min(MOST_COLUMNS, most - first + 1) + 1):
             rows = -(-(most - first + 1) // columns)
             turns, layout = (range(4), _upwards) if border == BORDER_SQUARES else (range(1), _downwards)
             fit = max(_fitting(near, pitch, layout(columns, first), turn) for turn in turns)
-            tried.append((fit, partial(_grid, columns, rows, pitch - 1.0, name, border, first)))
+            tried.append(
+                (fit, layout(columns, first), partial(_grid, columns, rows, pitch - 1.0, name, border, first))
+            )
         for columns, start in product(range(3, MOST_COLUMNS + 1), (1, 0)):
-            fit = _fitting(near, square, _chequered(columns, first, start))
-            tried.append((fit, partial(_charuco, columns, start, square, name, first, most)))
-    fit, board = max(tried, key=lambda one: one[0])
-    return board() if fit > LEAST_FITTING_SHARE else None
+            chequered = _chequered(columns, first, start)
+            fit = _fitting(near, square, chequered)
+            tried.append((fit, chequered, partial(_charuco, columns, start, square, name, first, most)))
+    fit, layout, board = max(tried, key=lambda one: one[0])
+    try:
+        return _LaidOut(board(), layout) if fit > LEAST_FITTING_SHARE else None
+    except InputError:  # what it seems to be cannot be
+        return None
 
 
 def _fitting(near: _Neighbours, pitch: float, layout: Layout, turn: int = 0) -> float:

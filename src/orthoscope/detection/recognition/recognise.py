@@ -1,4 +1,8 @@
-"""Which target some photographs show: what markers, corners and discs speak for, tried on them."""
+"""Which target some photographs show: what markers, corners and discs speak for, tried on them.
+
+What is found is painted over, and the photographs that show it are asked again: several boards in one
+photograph are told one after the other.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ import numpy as np
 from orthoscope.detection.chessboards.chessboard import board_size, lattice_sizes
 from orthoscope.detection.recognition.disc_layout import disc_boards
 from orthoscope.detection.recognition.marker_layout import marker_alone, marker_boards
+from orthoscope.detection.several_targets import painted_over
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
 from orthoscope.files.images import MOST_MEGAPIXELS
@@ -38,6 +43,8 @@ CORNERS_AROUND = 12
 FEWEST_OF_MARKED = 4
 # A marked chessboard is described with it until its marker is read.
 ANY_DICTIONARY = "DICT_4X4_50"
+# So many boards are told of.
+MOST_BOARDS = 6
 # A square of a chessboard, as it is described, metres.
 NOMINAL = 0.025
 
@@ -46,21 +53,28 @@ class Recognised(NamedTuple):
     """What photographs seem to show.
 
     Attributes:
-        target: with lengths of ours, since photographs show ratios only.
-        seen: how many of the photographs show it.
+        targets: each alone, with lengths of ours, since photographs show ratios only; first the one that was
+            seen first.
+        seen: how many of the photographs show each and all before it.
         looked_at: how many were looked at.
     """
 
-    target: Target
-    seen: int
+    targets: tuple[Target, ...]
+    seen: tuple[int, ...]
     looked_at: int
+
+    @property
+    def words(self) -> str:
+        """What a command is told."""
+        return " ".join(f"--target {target.name}" for target in self.targets)
 
     @property
     def sentence(self) -> str:
         """What is seen, and what to say next."""
+        shown = [f"{seen} show {target.name}" for target, seen in zip(self.targets, self.seen, strict=True)]
         return (
-            f"{self.seen} of {self.looked_at} photographs that were looked at show {self.target.name}, up to"
-            " its lengths, which no photograph tells: measure them, and say --target with the true ones"
+            f"of {self.looked_at} photographs that were looked at {' and '.join(shown)}, up to lengths, which"
+            f" no photograph tells: measure them, and say {self.words} with the true ones"
         )
 
 
@@ -75,22 +89,49 @@ def recognise(photographs: Given, *, most_megapixels: float = MOST_MEGAPIXELS) -
         CalibrationError: none of the kinds of target is seen.
     """
     greys = _some(photographs, most_megapixels)
-    best: tuple[int, int, Target] | None = None
-    for board in _candidates(greys):
-        target = target_of(board)
-        sights = [sight for grey in greys if isinstance(sight := see(grey, target), Sight)]
-        found = len(sights), sum(len(sight.ids) for sight in sights), target
-        if sights and (best is None or found[:2] > best[:2]):
-            best = found
-        if sights and len(sights) > 0.5 * len(greys) and board.kind != MarkedChessboard.kind:
+    looked_at, targets, seen = len(greys), [], []
+    while len(targets) < MOST_BOARDS:
+        best = _best(greys, [target.board for target in targets if target.board])
+        if best is None:
             break
-    if best is None:
+        targets.append(best.target)
+        seen.append(len(best.sights))
+        greys = [painted_over(greys[number], best.target, sight) for number, sight in best.sights.items()]
+    if not targets:
         raise CalibrationError(
-            f"none of {len(greys)} photographs shows a chessboard whose four sides are seen, markers in a"
+            f"none of {looked_at} photographs shows a chessboard whose four sides are seen, markers in a"
             " known layout, or a grid of discs, nor is a chessboard of one size in most of them. Say which"
             " target it is, or photograph the whole of it."
         )
-    return Recognised(best[2], best[0], len(greys))
+    return Recognised(tuple(targets), tuple(seen), looked_at)
+
+
+class _Seen(NamedTuple):
+    """A target and what is seen of it, by the number of the photograph."""
+
+    target: Target
+    sights: dict[int, Sight]
+
+    @property
+    def much(self) -> tuple[int, int]:
+        """In how many photographs it is seen, and how many corners of it."""
+        return len(self.sights), sum(len(sight.ids) for sight in self.sights.values())
+
+
+def _best(greys: Sequence[ndarray], others: Sequence[Board]) -> _Seen | None:
+    """The target that most photographs show, beside others that are known."""
+    best: _Seen | None = None
+    for board in _candidates(greys, others):
+        if any(board.mistaken_for(other) for other in others):
+            continue
+        target = target_of(board)
+        sights = {number: see(grey, target) for number, grey in enumerate(greys)}
+        found = _Seen(target, {number: one for number, one in sights.items() if isinstance(one, Sight)})
+        if found.sights and (best is None or found.much > best.much):
+            best = found
+        if len(found.sights) > 0.5 * len(greys) and board.kind != MarkedChessboard.kind:
+            break
+    return best
 
 
 def _some(photographs: Given, most_megapixels: float) -> list[ndarray]:
@@ -105,14 +146,20 @@ def _some(photographs: Given, most_megapixels: float) -> list[ndarray]:
     return greys
 
 
-def _candidates(greys: Sequence[ndarray]) -> Iterator[Board]:
-    """Boards that may be it; of two that are as often seen the first is taken."""
-    whole = Counter(size for grey in greys if (size := board_size(grey)))
-    if max(whole.values(), default=0) <= 0.5 * len(
-        greys
-    ):  # squares of a plain board take long to be no markers
-        yield from marker_boards(greys)
-    sizes = [size for size, _ in whole.most_common(2)] or _again_and_again(greys) or [_at_least(greys)]
+def _candidates(greys: Sequence[ndarray], others: Sequence[Board]) -> Iterator[Board]:
+    """Boards that may be it; of two that are as often seen the first is taken.
+
+    Args:
+        greys: photographs.
+        others: that are known. What is left of them may look like a part of a chessboard: beside them all
+            four sides of one are seen.
+    """
+    sides = Counter(size for grey in greys if (size := board_size(grey)))
+    if max(sides.values(), default=0) <= 0.5 * len(greys):  # squares take long to be no markers
+        yield from marker_boards(greys, others=others)
+    sizes = [size for size, _ in sides.most_common(2)]
+    if not sizes and not others:
+        sizes = _again_and_again(greys) or [_at_least(greys)]
     for columns, rows in sizes:
         yield from _marked(greys, columns, rows)
         if min(columns, rows) >= 3:

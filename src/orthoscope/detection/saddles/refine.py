@@ -97,6 +97,7 @@ class Refined(NamedTuple):
         whole: whether all its arms agree about it; where something covers a part of a window, they do not.
         spread: its standard deviation in its worst direction, pixels, by what its saddle leaves.
         plain: whether its window holds hardly anything but the saddle.
+        contrast: grey levels; of one sign where the square towards the next column and row is bright.
         usual: what is usual among them.
     """
 
@@ -107,11 +108,17 @@ class Refined(NamedTuple):
     whole: Bool[ndarray, " m"]
     spread: Float[ndarray, " m"]
     plain: Bool[ndarray, " m"]
+    contrast: Float[ndarray, " m"]
     usual: Usual
 
     def of(self, which: ndarray) -> Refined:
         """Some of them."""
         return Refined(*(part[which] for part in self[:-1]), self.usual)
+
+    def among(self, ids: Int[ndarray, " m"], count: int) -> Refined:
+        """Them at their numbers among so many, of which the others are nothing yet."""
+        parts = [np.zeros((count, *part.shape[1:]), part.dtype) for part in self[:-1]]
+        return Refined(*parts, self.usual).with_others(ids, self)
 
     def with_others(self, which: ndarray, others: Refined) -> Refined:
         """Some of them, by their numbers, replaced."""
@@ -237,7 +244,8 @@ def _refined(
     sure &= (_turn(saddles, shape) < WIDEST_TURN) & (
         np.abs(saddles.contrast) > LEAST_CONTRAST_SHARE * usual.contrast
     )
-    return Refined(pixels, believed, saddles.explained, sure, whole, saddles.spread * shrink, plain, usual)
+    spread = saddles.spread * shrink
+    return Refined(pixels, believed, saddles.explained, sure, whole, spread, plain, saddles.contrast, usual)
 
 
 def _have_whole_arms(told: SaddleArms, little: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:

@@ -20,9 +20,11 @@ from functools import partial
 import numpy as np
 
 from orthoscope.evaluation.comparison.entry import USUAL, Entry, parse_entry
+from orthoscope.evaluation.comparison.same_photographs import made_from
 from orthoscope.evaluation.metrics import held_out_nce, lateral_errors, normalised_calibration_error
 from orthoscope.evaluation.same_board import same_board
-from orthoscope.fitting.calibration import Calibration, residuals_of
+from orthoscope.fitting.board_order import listed_as_known
+from orthoscope.fitting.calibration import residuals_of
 from orthoscope.fitting.disc_centres import has_outlines
 from orthoscope.fitting.resection import resect
 from orthoscope.fitting.unseen.held_out import (
@@ -223,7 +225,7 @@ def _given(entry: Entry, camera: Camera, used: Detections, squares: Float[ndarra
         return Standing(entry, squares, failure=told)
     shape = TargetShape("flat", np.zeros_like(used.target.points))
     if made := entry.calibration:
-        if known := _seen_by(made, used):
+        if known := made_from(made, used):
             which = f"{known} of these {len(used.views)} photographs"
             return Standing(entry, squares, failure=f"it was made from {which}; judge it by others")
         learnt = made.target_shape
@@ -238,15 +240,10 @@ def _given(entry: Entry, camera: Camera, used: Detections, squares: Float[ndarra
     return Standing(entry, squares, camera, shape, lens_name(camera.lens))
 
 
-def _seen_by(calibration: Calibration, used: Detections) -> int:
-    """How many of the views a calibration was made from, by their corners."""
-    made_from = {view.pixels.tobytes() for view in calibration.detections.views}
-    return sum(view.pixels.tobytes() in made_from for view in used.views)
-
-
 def _with_poses_alone(standing: Standing, camera: Camera, used: Detections) -> Standing:
     """The same judged: camera and shape fixed, the pose of each view fitted."""
     shape = standing.target_shape
+    used = listed_as_known(camera, used, shape)
     try:
         poses = resect(camera, used, shape=shape)
     except CalibrationError as error:

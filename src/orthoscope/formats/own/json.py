@@ -24,6 +24,7 @@ from orthoscope.geometry.arrays import InputError
 from orthoscope.models.camera import Camera
 from orthoscope.simulation.scene import Scene
 from orthoscope.targets.detections import Detections
+from orthoscope.targets.mirrored import with_word_of_mirrors
 
 if TYPE_CHECKING:
     from orthoscope.evaluation.comparison.compare import Comparison
@@ -144,9 +145,12 @@ def _thing(content: bytes, kind: str, path: str | Path, judged: Sequence[Calibra
 
 
 def load_detections(path: str | Path) -> Detections:
-    """The detections of a file, also those that a calibration was made from; errors as `load`."""
+    """The detections of a file, also those that a calibration was made from; a remark says where corners run
+    the wrong way round. Errors as `load`.
+    """
     thing = load(path)
-    return _expect(Detections, thing.detections if isinstance(thing, Calibration) else thing, path)
+    found = _expect(Detections, thing.detections if isinstance(thing, Calibration) else thing, path)
+    return with_word_of_mirrors(found)
 
 
 def load_calibration(path: str | Path) -> Calibration:
