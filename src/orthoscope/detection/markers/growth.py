@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
+from orthoscope.detection.chessboards.grid import cross, grid_shape, nearest_neighbour
 from orthoscope.detection.markers.foreseen import are_off, next_corners
 from orthoscope.detection.saddles.linked import are_linked
-from orthoscope.detection.saddles.refine import Refined, refined, sought_again
+from orthoscope.detection.saddles.refine import WIDEST_SPREAD, WINDOW_SHARE, Refined, refined, sought_again
 from orthoscope.detection.sight import Sight
 from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 
@@ -29,6 +29,8 @@ MOST_TRIES, MOVED_SHARE = 3, 0.12
 # A corner is fitted no farther from where it was foreseen than this share of a step, that counts as at least
 # so many pixels: by 4 a tag's own corners may be off, however small the gaps.
 FARTHEST_SHARE, LEAST_STEP_PX = 0.4, 10.0
+# A saddle's fit has so many unknowns.
+SADDLE_UNKNOWNS = 9
 # A sight of a board has at least this many corners.
 FEWEST_CORNERS = 4
 # Where no more than this share of the corners is missing the whole board is seen.
@@ -106,7 +108,9 @@ def grown_from(
         return Grown(start, good, False)
     fine, good = _once_more(grey, fine, good, board)
     pixels = np.where(good[:, None], fine.pixels, np.nan)
-    return Grown(pixels, good & fine.sure & fine.whole, missing <= MOST_MISSING_SHARE * good.sum())
+    sure = good & fine.sure & fine.whole
+    sure[sure] = _have_pixels_enough(fine.of(sure), places[sure])
+    return Grown(pixels, sure, missing <= MOST_MISSING_SHARE * good.sum())
 
 
 def _once_more(
@@ -121,6 +125,15 @@ def _once_more(
     good = good.copy()
     good[ids] = _fit(again, start, ids, board)
     return fine.with_others(ids, again), good
+
+
+def _have_pixels_enough(fine: Refined, places: Float[ndarray, "k 2"]) -> Bool[ndarray, " k"]:
+    """Which corners are sure though a small window has hardly more pixels than a saddle has unknowns: what
+    these leave is then less than there is noise, and the spread by it too small.
+    """
+    shape = grid_shape(fine.pixels, places)
+    pixels = (2.0 * WINDOW_SHARE) ** 2 * np.abs(cross(shape.along, shape.down))
+    return fine.spread * np.sqrt(pixels / np.maximum(pixels - SADDLE_UNKNOWNS, 1.0)) < WIDEST_SPREAD
 
 
 def _fit(
