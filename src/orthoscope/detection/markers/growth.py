@@ -20,8 +20,8 @@ from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 
 __all__ = ["CornersOfBoard", "Grown", "grown_from", "grown_with", "sight_of"]
 
-# A corner strays from its neighbours' lines by less than this share of a step.
-MOST_STRAY_SHARE = 0.1
+# A corner strays from its neighbours' lines by less than this share of a step; a fisheye bends them by half.
+MOST_STRAY_SHARE = 0.2
 # No corner is sought nearer to the picture's rim than this, pixels.
 RIM_PX = 2.0
 # A corner is sought so many times, where it is foreseen elsewhere by more than this share of a step.
