@@ -29,6 +29,8 @@ MOST_TRIES, MOVED_SHARE = 3, 0.12
 # A corner is fitted no farther from where it was foreseen than this share of a step, that counts as at least
 # so many pixels: by 4 a tag's own corners may be off, however small the gaps.
 FARTHEST_SHARE, LEAST_STEP_PX = 0.4, 10.0
+# What is seen roughly is where others foresee it to this share of a step.
+ROUGHLY_SHARE = 0.15
 # A saddle's fit has so many unknowns.
 SADDLE_UNKNOWNS = 9
 # A sight of a board has at least this many corners.
@@ -81,7 +83,7 @@ def grown_from(
         approach: whether they may be off by more than a saddle's fit mends.
     """
     places, count = board.places, len(board.places)
-    start, good, fine = rough.copy(), np.zeros(count, dtype=bool), None
+    start, good, fine = _without_mistaken(rough, board, grey.shape), np.zeros(count, dtype=bool), None
     tried, tries = np.full_like(start, np.nan), np.zeros(count, dtype=int)
     for _ in range(int(board.cells.max(0).sum()) + 2):
         moved = ~(np.hypot(*(start - tried).T) < MOVED_SHARE * _step(start, places))
@@ -111,6 +113,16 @@ def grown_from(
     sure = good & fine.sure & fine.whole
     sure[sure] = _have_pixels_enough(fine.of(sure), places[sure])
     return Grown(pixels, sure, missing <= MOST_MISSING_SHARE * good.sum())
+
+
+def _without_mistaken(
+    rough: Float[ndarray, "m 2"], board: CornersOfBoard, shape: tuple[int, ...]
+) -> Float[ndarray, "m 2"]:
+    """Roughly seen corners without what is none of them: a lattice may end inside a marker."""
+    start, ids = rough.copy(), np.flatnonzero(np.isfinite(rough[:, 0]))
+    least = ROUGHLY_SHARE * _step(rough, board.places)
+    start[ids[are_off(rough[ids], board.places[ids], shape, least=least)]] = np.nan
+    return start
 
 
 def _once_more(
