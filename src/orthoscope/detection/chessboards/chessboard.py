@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from orthoscope.detection.chessboards.board_marks import ways_by_marks
@@ -90,7 +91,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             " at least 3x3."
         )
     parts: list[_Laid] = []
-    hanging, open_ = 0, False
+    hanging, open_, fits = 0, False, False
     for found, copy, others in _hanging_together(grey):
         if len(found.pixels) > FLOOR_RATIO * board.columns * board.rows:
             break
@@ -107,16 +108,12 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in large)
             return _sure(grey, sight, board, TWICE if alike else "")
         if is_even(grey, grid):
-            hanging = max(hanging, seen)
+            hanging, fits = max(hanging, seen), fits or _may_be_whole(grey, grid, board)
         parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: int(sight.sure.sum()), default=None)
     count = board.columns * board.rows
-    if (
-        best is None
-        and hanging != count
-        and count <= hanging / ENOUGH_CORNERS_SHARE
-        and (hanging <= TOO_MANY_RATIO * count)
-    ):
+    enough = ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count
+    if best is None and fits and enough and hanging != count:
         best = _by_opencv(grey, board)
     if best:
         return _sure(grey, best, board)
@@ -146,6 +143,22 @@ def _in_photograph(
     """The grid of a copy's lattice, in the photograph's pixels; None where nothing is left of it."""
     grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_PART_CORNERS else None
     return grid and grid._replace(corners=to_photograph(grid.corners, copy, grey))
+
+
+def _may_be_whole(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> bool:
+    """Whether all of the board is in the picture in one of the ways in which a grid lies on it, or in none
+    that is known.
+    """
+    ways = placements(grid, board.columns, board.rows)
+    far = np.array([board.columns - 1.0, board.rows - 1.0])
+    ends = far * [[0, 0], [1, 0], [1, 1], [0, 1]]
+    for ids in ways:
+        cells = np.stack([ids % board.columns, ids // board.columns], axis=-1).reshape(-1, 2)
+        homography, _ = cv2.findHomography(cells.astype(float), grid.corners.reshape(-1, 2), 0)
+        there = ends if homography is None else cv2.perspectiveTransform(ends[None], homography)[0]
+        if ((there >= 0) & (there <= np.array(grey.shape[::-1]) - 1)).all():
+            return True
+    return not ways
 
 
 def _is_whole(grid: Grid | None, board: Chessboard | MarkedChessboard) -> bool:

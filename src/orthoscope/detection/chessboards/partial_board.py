@@ -94,18 +94,31 @@ def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
     seen = np.isfinite(corners[..., 0])
     seen &= _stands(grey, filled(corners), bright)
     corners[~seen] = np.nan
-    box = _box(seen)
-    if box is None:
+    boxed = _boxed(corners, bright)
+    if boxed is None:
         return None
-    bright ^= bool((box[0].start + box[1].start) % 2)
-    grid, seen = filled(corners[box]), seen[box]
-    seen |= _stands(grey, grid, bright)
+    corners, bright = boxed
+    grid = filled(corners)
+    seen = np.isfinite(corners[..., 0]) | _stands(grey, grid, bright)
     part = plain_part(grey, grid, seen, bright)
     if part is None:
         return None
-    bright ^= bool((part[0].start + part[1].start) % 2)
-    grid, seen = grid[part], seen[part]
+    if part != tuple(slice(0, count) for count in seen.shape):  # what foresaw its gaps may be gone
+        bright ^= bool((part[0].start + part[1].start) % 2)
+        boxed = _boxed(np.where(seen[..., None], grid, np.nan)[part], bright)
+        if boxed is None:
+            return None
+        corners, bright = boxed
+        grid, seen = filled(corners), np.isfinite(corners[..., 0])
     return _taken_further(grey, grid, seen, bright, most)
+
+
+def _boxed(
+    corners: Float[ndarray, "r c 2"], bright: bool
+) -> tuple[Float[ndarray, "rows columns 2"], bool] | None:
+    """The rows and columns with corners, and whether their first square is the bright one; None without."""
+    box = _box(np.isfinite(corners[..., 0]))
+    return (corners[box], bright ^ bool((box[0].start + box[1].start) % 2)) if box else None
 
 
 def placements(grid: Grid, columns: int, rows: int, *, negative: bool = False) -> list[Int[ndarray, "r c"]]:

@@ -18,6 +18,8 @@ PLACES_IN_SQUARE = (0.3, 0.5, 0.7)
 LEAST_PLAIN_SHARE = 0.37
 # Of the squares of a strip whose corners are all seen more than this share is plain, or there is a fault.
 LEAST_PLAIN_SQUARES_SHARE = 0.5
+# A strip's contrast is below that of a square where it is by so many standard errors.
+SURE_ERRORS = 3.0
 # In the four squares around a corner the grey is looked at so far from their sides, squares.
 STEPS_INTO_SQUARE = (0.15, 0.25, 0.35)
 # Weights (3, 36) of the corner, its step along the row and its step along the column: nine places in each of
@@ -61,7 +63,8 @@ def plain_part(
     plain = whole & np.where(colours, values.min(0) > level, values.max(0) < level)
     for axis in (0, 1):
         known, right = whole.sum(1 - axis), plain.sum(1 - axis)
-        faults = np.flatnonzero((known > 0) & (right <= LEAST_PLAIN_SQUARES_SHARE * known)) + 1
+        patchy = _patchy_strips(values, whole & colours, whole & ~colours, axis)
+        faults = np.flatnonzero((known > 0) & (right <= LEAST_PLAIN_SQUARES_SHARE * known) | patchy) + 1
         if len(faults):
             ends, lines = [0, *faults.tolist(), seen.shape[axis]], seen.sum(1 - axis)
             most = max((slice(*part) for part in pairwise(ends)), key=lambda part: lines[part].sum())
@@ -73,6 +76,33 @@ def plain_part(
         return rows, columns
     contrast = values[:, light].mean(1) - values[:, dark].mean(1)
     return (rows, columns) if contrast.min() > LEAST_PLAIN_SHARE * contrast.max() else None
+
+
+def _patchy_strips(
+    values: Float[ndarray, "9 a b"], light: Bool[ndarray, "a b"], dark: Bool[ndarray, "a b"], axis: int
+) -> Bool[ndarray, " k"]:
+    """Which strips of squares have, at one of the nine places, surely less contrast than a square has.
+
+    Where links leap two squares on and one to the side, places are squares of one colour, or lie between
+    two.
+    """
+    (bright, error), (black, black_error) = (
+        _means_of_strips(values, squares, 1 - axis) for squares in (light, dark)
+    )
+    contrast = bright - black
+    above = contrast + SURE_ERRORS * np.sqrt(error**2 + black_error**2)
+    return (above < LEAST_PLAIN_SHARE * contrast.max(0)).any(0)
+
+
+def _means_of_strips(
+    values: Float[ndarray, "9 a b"], squares: Bool[ndarray, "a b"], across: int
+) -> tuple[Float[ndarray, "9 k"], Float[ndarray, "9 k"]]:
+    """The mean of some squares of each strip at each place, and its standard error; NaN for one square."""
+    count = squares.sum(across)
+    mean = (values * squares).sum(1 + across) / np.maximum(count, 1)
+    rest = (values - np.expand_dims(mean, 1 + across)) * squares
+    enough = np.where(count > 1, count * (count - 1.0), np.nan)
+    return mean, np.sqrt((rest**2).sum(1 + across) / enough)
 
 
 def _in_squares(grey: ndarray, corners: Float[ndarray, "r c 2"]) -> Float[ndarray, "9 a b"] | None:

@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.detection.memory import Memory
 from orthoscope.detection.saddles.saddle_windows import COLUMN_COUNT, Shapes, Windows
 from orthoscope.geometry.arrays import Float, median, ndarray
 
@@ -54,7 +55,9 @@ DAMPING = np.array([1e-3] * 5 + [1e-6] * 2 + [0.03] * 2)
 # strong, more than that is taken for noise.
 USUAL_LIGHT = 0.02
 # So many pixels of all windows are done together, so that the arrays stay in cache.
-PIXELS_AT_ONCE = 60_000
+PIXELS_AT_ONCE = 80_000
+# Of the windows of one batch, whose next begins when it is done.
+MEMORY = Memory()
 
 
 class Saddles(NamedTuple):
@@ -150,6 +153,7 @@ class _Fit:
                 shares[some] * self.along[some],
                 shares[some] * self.down[some],
                 self.arms[some] / shares[some, 0],
+                MEMORY,
             )
             rows = np.arange(len(some))
             for _ in range(STAGE_STEPS):
