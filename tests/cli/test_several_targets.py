@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -77,3 +78,19 @@ def test_views_of_several_targets_are_not_simulated_and_that_is_said(run, tmp_pa
     refused = run("simulate", *targets, "-o", tmp_path)
     assert refused.code == 2
     assert f"simulate was given 2 targets ({' + '.join(SPECS)}); expected one" in refused.err
+
+
+def test_auto_names_every_board_to_copy_and_frames_of_a_film_share_a_line(run, tmp_path):
+    boards = [parse_target(spec) for spec in ("chessboard:6x5:25mm", "circles:3x7:20mm:asymmetric")]
+    stands = [
+        (board, Pose(rotation_from_vector(np.array([0.2, turn, 0.0])), np.array([x, -0.06, 0.5])))
+        for board, x, turn in zip(boards, (-0.18, 0.02), (0.3, -0.2), strict=True)
+    ]
+    picture = Renderer(CAMERA).photograph_of(stands, rng=np.random.default_rng(0))
+    write_image(tmp_path / "a.png", picture)
+    told = run("detect", tmp_path / "a.png", "--target", "auto").out
+    assert "--target chessboard:6x5:25mm --target circles:3x7:20mm:asymmetric" in told
+    pages = [picture, *(np.roll(np.full_like(picture, 90), step) + np.uint8(40 * step) for step in (1, 2, 3))]
+    cv2.imwritemulti(str(tmp_path / "walk.tif"), pages)
+    told = run("detect", tmp_path / "walk.tif", "--target", "chessboard:6x5:25mm", "-o", tmp_path / "d.json")
+    assert "walk.tif#2 and 2 more of it: chessboard:6x5:25mm was not found in it\n" in told.out

@@ -107,6 +107,18 @@ def test_a_disc_that_is_partly_covered_is_left_out():
     assert np.linalg.norm(sight.pixels - truth[sight.ids], axis=1).max() < 0.3
 
 
+def test_the_edge_of_a_shadow_moves_no_disc():
+    board = Circles(4, 7, 0.02, "asymmetric", 0.012)
+    picture, truth = photographed(board, (0.1, 0.2, 0.1), 0.3)
+    x = np.arange(picture.shape[1])
+    for middle in (truth[12, 0] - 6.0, truth[12, 0], truth[12, 0] + 8.0):
+        share = 0.65 + 0.35 * np.tanh((x - middle) / 2.0)
+        sight = see_circles(np.rint(share * picture).astype(np.uint8), board)
+        assert isinstance(sight, Sight)
+        assert len(sight.ids) >= len(truth) - 8  # those in the shadow's edge cannot be known
+        assert np.linalg.norm(sight.pixels - truth[sight.ids], axis=1).max() < 0.1
+
+
 def blurred_discs(rng: np.random.Generator, *, radius: float, blur: float, noise: float, count: int = 36):
     """A picture of discs in rows of six, their centres and the half step from inside to outside."""
     apart, step = 4.0 * radius, 75.0

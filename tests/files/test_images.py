@@ -14,7 +14,7 @@ from numpy.testing import assert_array_equal
 from PIL import Image
 
 from orthoscope.files.image_headers import without_turning
-from orthoscope.files.images import names_of, photographs, read_image, write_image
+from orthoscope.files.images import names_of, pages_of, photographs, read_image, write_image
 from orthoscope.geometry.arrays import InputError
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (48, 64), dtype=np.uint8)
@@ -191,8 +191,8 @@ def test_a_tag_that_says_how_the_camera_was_held_turns_no_tiff_on_any_page(tmp_p
     upright.save(path, save_all=True, append_images=others, tiffinfo={274: 6}, **settings)
     with Image.open(path) as image:
         assert image.tag_v2[274] == 6  # pyright: ignore[reportAttributeAccessIssue]
-    for page, pixels in enumerate(pages):
-        assert_array_equal(read_image(path, grey=True, page=page), pixels)
+    for page, pixels in zip(pages_of(path), pages, strict=True):
+        assert_array_equal(page, pixels)
 
 
 @given(st.binary(max_size=60), st.sampled_from([b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]))

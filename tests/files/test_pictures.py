@@ -56,6 +56,20 @@ def test_every_picture_of_an_animation_is_a_picture(tmp_path, suffix):
         assert_array_equal(picture.grey(most_megapixels=1.0), page)
 
 
+def test_of_many_pages_some_that_are_sharp_and_differ_are_taken(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    pages = [np.roll(RAMP, shift // 2, axis=1) for shift in range(150)]
+    first, *others = (image.fromarray(page) for page in pages)
+    first.save(tmp_path / "walk.tif", save_all=True, append_images=others)
+    found = pictures(tmp_path / "walk.tif")
+    assert 20 < len(found) <= 60
+    for picture in found:
+        number = int(picture.name.removeprefix("walk.tif#"))
+        assert_array_equal(picture.grey(most_megapixels=1.0), pages[number - 1])
+    with pytest.raises(InputError, match=r"expected at most 0\.001"):
+        found[0].grey(most_megapixels=0.001)
+
+
 def test_contrast_follows_the_picture_and_one_infinite_pixel_does_no_harm():
     thermal = (29500 + RAMP.astype(float) / 2).astype(np.uint16)
     shown = to_grey(thermal)

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from orthoscope.cli.shared import options
 from orthoscope.cli.shared.printing import tell, tell_json
+
+if TYPE_CHECKING:
+    from orthoscope.targets.detections import SetAside
 
 __all__ = ["detect"]
 
@@ -86,11 +92,21 @@ def detect(
         f"views      {len(used)} of {len(used) + len(aside)} photographs, {detections.corners} corners,"
         f" {width}x{height}"
     )
-    for entry in aside:
-        tell(f"           {entry.image}: {entry.reason}")
+    tell(*(f"           {line}" for line in _reasons(aside)))
     for remark in detections.remarks:
         tell(f"remark     {remark.image}: {remark.words}")
     tell(f"wrote      {out}")
+
+
+def _reasons(aside: Sequence[SetAside]) -> Iterator[str]:
+    """A line for each photograph that was set aside, and for frames of one film that have the same reason."""
+    from orthoscope.files.pictures import file_name_of
+
+    for (_, reason), same in groupby(
+        aside, key=lambda one: (file_name_of(one.image) or one.image, one.reason)
+    ):
+        first, *others = (entry.image for entry in same)
+        yield f"{first}{f' and {len(others)} more of it' if others else ''}: {reason}"
 
 
 def _recognise(photos: tuple[str, ...], *, as_json: bool) -> None:

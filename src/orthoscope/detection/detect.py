@@ -118,7 +118,8 @@ def _look(picture: Picture, target: Target, most_megapixels: float) -> _Look:
     try:
         grey = picture.grey(most_megapixels=most_megapixels)
     except InputError as error:
-        return _Look(None, "", {}, str(error).removeprefix(f"{picture.source} "))
+        named = picture.source if isinstance(picture.source, Path) else picture.name
+        return _Look(None, "", {}, str(error).removeprefix(f"{named} "))
     size = (grey.shape[1], grey.shape[0])
     sights = see_members(grey, target)
     reasons = [

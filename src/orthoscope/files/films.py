@@ -22,7 +22,7 @@ from orthoscope.files.images import to_grey
 from orthoscope.files.sensor_frames import open_film
 from orthoscope.geometry.arrays import InputError, ndarray
 
-__all__ = ["FILMS", "Frame", "frames_of", "worth_looking_at"]
+__all__ = ["FILMS", "MOST_FRAMES", "Frame", "frames_of", "in_a_file", "worth_looking_at"]
 
 FILMS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".wmv")
 # At most so many frames are kept.
@@ -111,10 +111,10 @@ def _with(kept: list[_Kept], picture: ndarray, seconds: float, stretch: int) -> 
         return kept
     if same and kept[-1].sharpness >= sharpness:
         return kept
-    return [*before, _Kept(Frame(seconds, _in_a_file(grey)), sharpness, small, stretch)]
+    return [*before, _Kept(Frame(seconds, in_a_file(grey)), sharpness, small, stretch)]
 
 
-def _in_a_file(picture: ndarray) -> ndarray:
+def in_a_file(picture: ndarray) -> ndarray:
     """The picture in a file without a name."""
     with TemporaryFile() as file:
         mapped = np.memmap(file, dtype=picture.dtype, mode="w+", shape=picture.shape)

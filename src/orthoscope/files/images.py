@@ -29,9 +29,10 @@ from orthoscope.geometry.arrays import InputError, ndarray
 __all__ = [
     "MOST_MEGAPIXELS",
     "SUFFIXES",
+    "check_size",
     "checked_whole",
     "names_of",
-    "pages_in",
+    "pages_of",
     "passed_over",
     "photographs",
     "quiet",
@@ -107,15 +108,12 @@ def names_of(files: Iterable[Path]) -> list[str]:
     return [str(file) for file in files]
 
 
-def read_image(
-    path: Path_, *, grey: bool = False, page: int = 0, most_megapixels: float = MOST_MEGAPIXELS
-) -> ndarray:
+def read_image(path: Path_, *, grey: bool = False, most_megapixels: float = MOST_MEGAPIXELS) -> ndarray:
     """A photograph as its sensor saw it: uint8 (h,w) where grey, else (h,w,3) blue, green, red.
 
     Args:
         path: of the file.
         grey: one channel, its contrast stretched where it has more than 8 bits.
-        page: of a file that holds several pictures, from 0.
         most_megapixels: a file that says it holds more is refused before memory is taken.
     Raises:
         InputError: the file is missing, empty, no image, cut off or too large.
@@ -132,11 +130,7 @@ def read_image(
     flags |= cv2.IMREAD_IGNORE_ORIENTATION
     with _QUIET:
         try:
-            if page:
-                _, pages = cv2.imdecodemulti(np.frombuffer(content, dtype=np.uint8), flags)
-                image = pages[page] if page < len(pages) else None
-            else:
-                image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
+            image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
         except cv2.error:
             image = None
     if image is None:
@@ -147,17 +141,20 @@ def read_image(
     return to_grey(image) if grey else _to_8_bits(image)
 
 
-def pages_in(path: Path) -> int:
-    """How many pictures a file holds; 1 for kinds that hold one, and where it cannot be told."""
+def pages_of(path: Path) -> list[ndarray]:
+    """The pictures (h,w) of a file that holds several, read at once; none of one that holds one, or where it
+    cannot be told.
+    """
     if path.suffix.lower() not in PAGED_SUFFIXES:
-        return 1
+        return []
+    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
-        content = _content(path, MOST_MEGAPIXELS)
+        content = without_turning(_content(path, MOST_MEGAPIXELS))
         with _QUIET:
-            _, pages = cv2.imdecodemulti(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
+            _, pages = cv2.imdecodemulti(np.frombuffer(content, dtype=np.uint8), flags)
     except (InputError, cv2.error):
-        return 1
-    return max(1, len(pages))
+        return []
+    return list(pages) if len(pages) > 1 else []
 
 
 def to_grey(image: ndarray) -> ndarray:
@@ -189,14 +186,27 @@ def _content(path: Path, most_megapixels: float) -> bytes:
             f"{path} is no file but a folder, pipe or device; expected a photograph. Leave it out."
         )
     content = read_bytes(path)
-    width, height = size_in_header(content) or (0, 0)
+    check_size(path, size_in_header(content) or (0, 0), most_megapixels)
+    return checked_whole(content, path)
+
+
+def check_size(name: Path_, size: tuple[int, int], most_megapixels: float) -> None:
+    """Checks that a picture is not too large.
+
+    Args:
+        name: of it, for the message.
+        size: (width, height) pixels.
+        most_megapixels: that it may have.
+    Raises:
+        InputError: it is.
+    """
+    width, height = size
     if width * height > most_megapixels * 1e6:
         raise InputError(
-            f"{path} says that it is {width}x{height}, {width * height / 1e6:.0f} megapixels; expected at"
+            f"{name} says that it is {width}x{height}, {width * height / 1e6:.0f} megapixels; expected at"
             f" most {most_megapixels:g}. Allow more (most_megapixels; detect --max-megapixels) if it is a"
             " photograph."
         )
-    return checked_whole(content, path)
 
 
 def checked_whole(content: bytes, path: Path_) -> bytes:

@@ -2,7 +2,7 @@
 name.
 
 A frame's name is its film's and its time, `walk.mp4@12.345s`; a page's its file's and its number,
-`scan.tif#2`.
+`scan.tif#2`. Of a file with many pages some are looked at, as of a film.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from orthoscope.files.bags import BAGS, pictures_in_bag
-from orthoscope.files.films import FILMS, frames_of, worth_looking_at
-from orthoscope.files.images import names_of, pages_in, photographs, read_image, to_grey
+from orthoscope.files.films import FILMS, MOST_FRAMES, frames_of, in_a_file, worth_looking_at
+from orthoscope.files.images import check_size, names_of, pages_of, photographs, read_image, to_grey
 from orthoscope.geometry.arrays import InputError, ndarray
 
 __all__ = ["MOVING", "Given", "Picture", "file_name_of", "pictures"]
@@ -36,12 +36,10 @@ class Picture:
     Attributes:
         name: what its view will be called.
         source: the file, or the picture itself, (h,w) or (h,w,3).
-        page: of the file, from 0.
     """
 
     name: str
     source: Path | ndarray
-    page: int = 0
 
     def grey(self, *, most_megapixels: float) -> ndarray:
         """The picture, (h,w) uint8.
@@ -50,7 +48,8 @@ class Picture:
             InputError: it cannot be read, or is larger than so many million pixels.
         """
         if isinstance(self.source, Path):
-            return read_image(self.source, grey=True, page=self.page, most_megapixels=most_megapixels)
+            return read_image(self.source, grey=True, most_megapixels=most_megapixels)
+        check_size(self.name, self.source.shape[1::-1], most_megapixels)
         return to_grey(self.source)
 
 
@@ -92,10 +91,17 @@ def _of_file(name: str, file: Path, topic: str | None) -> list[Picture]:
     if suffix in MOVING:
         frames = frames_of(file) if suffix in FILMS else worth_looking_at(pictures_in_bag(file, topic))
         return [Picture(f"{name}{AT}{frame.seconds:.3f}s", frame.picture) for frame in frames]
-    pages = pages_in(file)
-    if pages < 2:
+    pages = pages_of(file)
+    if not pages:
         return [Picture(name, file)]
-    return [Picture(f"{name}{PAGE}{page + 1}", file, page) for page in range(pages)]
+    if len(pages) > MOST_FRAMES:
+        numbered = ((float(number), page) for number, page in enumerate(pages, 1))
+        return [
+            Picture(f"{name}{PAGE}{frame.seconds:.0f}", frame.picture) for frame in worth_looking_at(numbered)
+        ]
+    return [
+        Picture(f"{name}{PAGE}{number}", in_a_file(to_grey(page))) for number, page in enumerate(pages, 1)
+    ]
 
 
 def _checked(array: ndarray) -> ndarray:

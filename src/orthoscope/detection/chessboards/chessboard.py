@@ -250,7 +250,9 @@ def _on_board(
     arms = np.ones(grid.seen.shape)
     if isinstance(board, MarkedChessboard):
         negative = placements(grid, board.columns, board.rows, negative=True)
-        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(grey, grid, negative, board)
+        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(
+            grey, grid, negative, board, only_seen=True
+        )
     if not ways or not _alike(ways, grid.seen, board.symmetries()):
         return None
     whole = grid.seen.size == board.columns * board.rows

@@ -14,7 +14,7 @@ import numpy as np
 
 from orthoscope.detection.discs.disc_fit import fit_discs
 from orthoscope.detection.discs.disc_spots import SMOOTHING_SIGMA
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, median, ndarray
 from orthoscope.geometry.ellipses import Ellipses, fit_ellipses
 
 __all__ = ["Outlines", "fitted_whole", "outlines_near", "smoothed"]
@@ -47,6 +47,9 @@ FARTHEST_MOVE_RADII = 0.25
 # A sector of a whole disc's outline is off the ellipse by less than this share of a radius, or so many
 # standard deviations.
 MOST_SECTOR_RADII, MOST_SECTOR_SPREADS = 0.02, 4.0
+# A fit leaves less of the picture than this, half steps from inside to outside, or than so many times what is
+# usual: the edge of a shadow, glare or a finger moves a disc that it crosses.
+MOST_REST, TIMES_USUAL_REST = 0.1, 3.0
 # At least this share of the rays meets the outline.
 LEAST_RAYS_SHARE = 0.9
 
@@ -119,7 +122,7 @@ def outlines_near(smooth: ndarray, rough: Ellipses) -> Outlines:
 
 def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     """Outlines by rays, each fitted to all pixels about it, but for discs hardly wider than the blur; NaN
-    where one is not whole in the picture, a sector of it is off, or noise hides where it is.
+    where one is not whole in the picture, something lies over it, or noise hides where it is.
 
     Args:
         grey: (h,w) uint8.
@@ -133,7 +136,8 @@ def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     wide = np.abs(np.linalg.eigvalsh(found.axes[which])).min(1, initial=np.inf) > LEAST_BLURS * fit.blur
     taken = wide & (moved < FARTHEST_MOVE_RADII * size)
     off = np.maximum(MOST_SECTOR_RADII * size[:, None], MOST_SECTOR_SPREADS * fit.spread)
-    smooth = ((np.abs(fit.off) < off).all(1) | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
+    clean = fit.rest < max(MOST_REST, TIMES_USUAL_REST * median(fit.rest))
+    smooth = ((np.abs(fit.off) < off).all(1) & clean | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
     centres, axes = found.centres.copy(), found.axes.copy()
     centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
     centres[which[~smooth]], axes[which[~smooth]] = np.nan, np.nan

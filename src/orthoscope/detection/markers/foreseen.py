@@ -80,7 +80,11 @@ def next_corners(
 
 
 def are_off(
-    pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], shape: tuple[int, ...]
+    pixels: Float[ndarray, "m 2"],
+    places: Float[ndarray, "m 2"],
+    shape: tuple[int, ...],
+    *,
+    least: float = LEAST_PX,
 ) -> Bool[ndarray, " m"]:
     """Which corners are off.
 
@@ -88,6 +92,7 @@ def are_off(
         pixels: the corners.
         places: where the board has them.
         shape: of the picture.
+        least: what is no farther off is not off, pixels.
     """
     off = np.zeros(len(pixels), dtype=bool)
     if len(pixels) < FEWEST_CORNERS or not np.ptp(places, axis=0).all():
@@ -96,7 +101,7 @@ def are_off(
     bent = min(BENDS, key=lambda bend: _bent_apart((pixels - centre) / radius, places, bend))
     while off.sum() <= MOST_OUT_SHARE * len(off):
         flat = _bent((pixels[~off] - centre) / radius, places[~off], bent) * radius + centre
-        excess = _excess(pixels[~off] - flat, places[~off])
+        excess = _excess(pixels[~off] - flat, places[~off], least)
         if excess.max() <= 1.0:
             break
         off[np.flatnonzero(~off)[excess.argmax()]] = True
@@ -119,7 +124,7 @@ def _bent(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], bend: fl
     return there * (2.0 / (1.0 + np.sqrt(1.0 + 4.0 * bend * away**2)))[:, None]
 
 
-def _excess(rest: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Float[ndarray, " m"]:
+def _excess(rest: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], least: float) -> Float[ndarray, " m"]:
     """How far each corner is off, over what is allowed there, by what a flat board leaves."""
     orders = [order for order in range(1, MOST_ORDER + 1) if CORNERS_PER_TERM * _count(order) <= len(rest)]
     x, y = (2.0 * (places - places.min(0)) / np.maximum(np.ptp(places, axis=0), 1e-9) - 1.0).T
@@ -134,7 +139,7 @@ def _excess(rest: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Float
     excess = np.zeros(len(rest))
     for number, (here, weight) in enumerate(zip(off, weights, strict=True)):
         residual = np.hypot(*here.T)
-        missed = np.maximum(TIMES_USUAL * median(residual) / np.sqrt(1.0 - weight), LEAST_PX)
+        missed = np.maximum(TIMES_USUAL * median(residual) / np.sqrt(1.0 - weight), least)
         others = np.stack(off[max(number - 1, 0) : number + ORDERS_BEYOND + 1])
         beyond = np.hypot(*(others - here).transpose(2, 0, 1)).max(0)
         excess = np.maximum(excess, residual / (missed + beyond))

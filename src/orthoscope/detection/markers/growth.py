@@ -11,17 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
+from orthoscope.detection.chessboards.grid import cross, grid_shape, nearest_neighbour
 from orthoscope.detection.markers.foreseen import are_off, next_corners
 from orthoscope.detection.saddles.linked import are_linked
-from orthoscope.detection.saddles.refine import Refined, refined, sought_again
+from orthoscope.detection.saddles.refine import WIDEST_SPREAD, WINDOW_SHARE, Refined, refined, sought_again
 from orthoscope.detection.sight import Sight
 from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 
 __all__ = ["CornersOfBoard", "Grown", "grown_from", "grown_with", "sight_of"]
 
-# A corner strays from its neighbours' lines by less than this share of a step.
-MOST_STRAY_SHARE = 0.1
+# A corner strays from its neighbours' lines by less than this share of a step; a fisheye bends them by half.
+MOST_STRAY_SHARE = 0.2
 # No corner is sought nearer to the picture's rim than this, pixels.
 RIM_PX = 2.0
 # A corner is sought so many times, where it is foreseen elsewhere by more than this share of a step.
@@ -29,6 +29,10 @@ MOST_TRIES, MOVED_SHARE = 3, 0.12
 # A corner is fitted no farther from where it was foreseen than this share of a step, that counts as at least
 # so many pixels: by 4 a tag's own corners may be off, however small the gaps.
 FARTHEST_SHARE, LEAST_STEP_PX = 0.4, 10.0
+# What is seen roughly is where others foresee it to this share of a step.
+ROUGHLY_SHARE = 0.15
+# A saddle's fit has so many unknowns.
+SADDLE_UNKNOWNS = 9
 # A sight of a board has at least this many corners.
 FEWEST_CORNERS = 4
 # Where no more than this share of the corners is missing the whole board is seen.
@@ -79,7 +83,7 @@ def grown_from(
         approach: whether they may be off by more than a saddle's fit mends.
     """
     places, count = board.places, len(board.places)
-    start, good, fine = rough.copy(), np.zeros(count, dtype=bool), None
+    start, good, fine = _without_mistaken(rough, board, grey.shape), np.zeros(count, dtype=bool), None
     tried, tries = np.full_like(start, np.nan), np.zeros(count, dtype=int)
     for _ in range(int(board.cells.max(0).sum()) + 2):
         moved = ~(np.hypot(*(start - tried).T) < MOVED_SHARE * _step(start, places))
@@ -106,7 +110,19 @@ def grown_from(
         return Grown(start, good, False)
     fine, good = _once_more(grey, fine, good, board)
     pixels = np.where(good[:, None], fine.pixels, np.nan)
-    return Grown(pixels, good & fine.sure & fine.whole, missing <= MOST_MISSING_SHARE * good.sum())
+    sure = good & fine.sure & fine.whole
+    sure[sure] = _have_pixels_enough(fine.of(sure), places[sure])
+    return Grown(pixels, sure, missing <= MOST_MISSING_SHARE * good.sum())
+
+
+def _without_mistaken(
+    rough: Float[ndarray, "m 2"], board: CornersOfBoard, shape: tuple[int, ...]
+) -> Float[ndarray, "m 2"]:
+    """Roughly seen corners without what is none of them: a lattice may end inside a marker."""
+    start, ids = rough.copy(), np.flatnonzero(np.isfinite(rough[:, 0]))
+    least = ROUGHLY_SHARE * _step(rough, board.places)
+    start[ids[are_off(rough[ids], board.places[ids], shape, least=least)]] = np.nan
+    return start
 
 
 def _once_more(
@@ -121,6 +137,15 @@ def _once_more(
     good = good.copy()
     good[ids] = _fit(again, start, ids, board)
     return fine.with_others(ids, again), good
+
+
+def _have_pixels_enough(fine: Refined, places: Float[ndarray, "k 2"]) -> Bool[ndarray, " k"]:
+    """Which corners are sure though a small window has hardly more pixels than a saddle has unknowns: what
+    these leave is then less than there is noise, and the spread by it too small.
+    """
+    shape = grid_shape(fine.pixels, places)
+    pixels = (2.0 * WINDOW_SHARE) ** 2 * np.abs(cross(shape.along, shape.down))
+    return fine.spread * np.sqrt(pixels / np.maximum(pixels - SADDLE_UNKNOWNS, 1.0)) < WIDEST_SPREAD
 
 
 def _fit(

@@ -22,7 +22,7 @@ from orthoscope.detection.saddles.saddle import Saddles, fit_saddles
 from orthoscope.detection.saddles.saddle_arms import SaddleArms, saddle_arms
 from orthoscope.geometry.arrays import Bool, Float, Int, distinct, median, ndarray
 
-__all__ = ["Refined", "Usual", "refined", "sought_again"]
+__all__ = ["WIDEST_SPREAD", "WINDOW_SHARE", "Refined", "Usual", "refined", "sought_again"]
 
 # Half the window of cornerSubPix is this share of a square.
 NEAR_SHARE = 0.25
