@@ -14,7 +14,7 @@ import numpy as np
 
 from orthoscope.detection.discs.disc_fit import fit_discs
 from orthoscope.detection.discs.disc_spots import SMOOTHING_SIGMA
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, median, ndarray
 from orthoscope.geometry.ellipses import Ellipses, fit_ellipses
 
 __all__ = ["Outlines", "fitted_whole", "outlines_near", "smoothed"]
@@ -47,6 +47,9 @@ FARTHEST_MOVE_RADII = 0.25
 # A sector of a whole disc's outline is off the ellipse by less than this share of a radius, or so many
 # standard deviations.
 MOST_SECTOR_RADII, MOST_SECTOR_SPREADS = 0.02, 4.0
+# What is usual of all discs counts as noise, too: print and sharpening make outlines ragged; up to this share
+# of a radius.
+MOST_RAGGED_RADII = 0.1
 # At least this share of the rays meets the outline.
 LEAST_RAYS_SHARE = 0.9
 
@@ -132,7 +135,12 @@ def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     size = np.sqrt(np.abs(np.linalg.det(found.axes[which])))
     wide = np.abs(np.linalg.eigvalsh(found.axes[which])).min(1, initial=np.inf) > LEAST_BLURS * fit.blur
     taken = wide & (moved < FARTHEST_MOVE_RADII * size)
-    off = np.maximum(MOST_SECTOR_RADII * size[:, None], MOST_SECTOR_SPREADS * fit.spread)
+    ragged = median(np.abs(fit.off[taken])) / 0.6745 if taken.any() else 0.0
+    most = MOST_SECTOR_SPREADS * np.hypot(fit.spread, ragged)
+    off = np.maximum(
+        MOST_SECTOR_RADII * size[:, None],
+        np.minimum(most, MOST_RAGGED_RADII * size[:, None] + MOST_SECTOR_SPREADS * fit.spread),
+    )
     smooth = ((np.abs(fit.off) < off).all(1) | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
     centres, axes = found.centres.copy(), found.axes.copy()
     centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
