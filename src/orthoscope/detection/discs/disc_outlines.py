@@ -60,7 +60,7 @@ class Outlines(NamedTuple):
     Attributes:
         ellipses: through them, NaN where there is no whole one.
         roughness: (n,) rms of an outline about its ellipse, in radii.
-        contrast: (n,) from inside to outside, as a share of the outside.
+        contrast: (n,) from black to white, as a share of the white.
         doubt: (n,) how far a sector of it may be off unseen, radii; infinite where it was not fitted whole,
             or is hardly wider than the blur.
     """
@@ -81,13 +81,19 @@ class Outlines(NamedTuple):
         return Outlines(ellipses, *rest)
 
 
-def smoothed(grey: ndarray) -> ndarray:
-    """A picture as `outlines_near` takes it, float32; grey: (h,w) uint8."""
-    return cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA).astype(np.float32)
+def smoothed(grey: ndarray, *, white: bool = False) -> ndarray:
+    """A picture as `outlines_near` takes it, float32.
+
+    Args:
+        grey: (h,w) uint8.
+        white: whether discs are brighter than what is around them; the picture is then less than 0.
+    """
+    smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA).astype(np.float32)
+    return -smooth if white else smooth
 
 
 def outlines_near(smooth: ndarray, rough: Ellipses) -> Outlines:
-    """The outlines of discs that are dark, by rays.
+    """The outlines of discs, by rays.
 
     Args:
         smooth: (h,w), as `smoothed` makes it.
@@ -182,5 +188,6 @@ def _outline(
     far_x, far_y = (centres[:, i, None] + arms[:, i] * 1.1 for i in (0, 1))
     in_picture = (far_x > 0) & (far_x < width - 1) & (far_y > 0) & (far_y < height - 1)
     good = rises.any(-1) & in_picture & (outside - inside > LEAST_CONTRAST)
-    contrast = np.median(outside - inside, axis=1) / np.maximum(np.median(outside, axis=1), 1.0)
+    white = np.maximum(np.abs(np.median(outside, axis=1)), np.abs(inside[:, 0]))
+    contrast = np.median(outside - inside, axis=1) / np.maximum(white, 1.0)
     return np.where(good, found, np.nan), np.maximum(contrast, LEAST_SHARE)
