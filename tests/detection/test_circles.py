@@ -166,5 +166,5 @@ def test_discs_that_are_all_ragged_are_whole():
         cv2.INTER_CUBIC,
         borderMode=cv2.BORDER_REPLICATE,
     )
-    # an outline has some seven parts that differ: a centre moves by 0.2 px times the root of 2 over 7, each way
+    # an outline has some seven parts that differ: a centre moves by 0.2 px times the root of 2 over 7
     assert rms_off(see_circles(ragged, board), truth) < 1.5 * 0.2 * np.sqrt(2.0 * 2.0 / 7.0)
