@@ -12,8 +12,10 @@ from orthoscope.detection.markers.joint_reading import Squares, drawings_of, lik
 from orthoscope.detection.markers.markers import find_markers
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.table import see
+from orthoscope.targets.aprilgrid import BORDER_SQUARES, AprilGrid
+from orthoscope.targets.aprilgrid import DICTIONARY as APRILTAGS
 from orthoscope.targets.charuco import Charuco
-from orthoscope.targets.markers import dictionary
+from orthoscope.targets.markers import dictionary, marker_modules
 from orthoscope.targets.target import target_of
 
 NAME, SQUARE = "DICT_4X4_100", 13  # px: a marker's square is 1.5 px
@@ -38,6 +40,28 @@ def where(columns: int, rows: int) -> np.ndarray:
     return (np.stack([column, row], axis=1) + 0.5) * SQUARE + 29.5
 
 
+def small_aprilgrid(board: AprilGrid, way_up: int) -> tuple[np.ndarray, np.ndarray]:
+    """A board whose tags' squares are 1.8 px, turned by quarters from how OpenCV draws them; its corners."""
+    module, gap, margin = 12, 36, 90  # px, before it is made smaller
+    picture = np.full((4 * 156 + gap + 2 * margin, 5 * 156 + gap + 2 * margin), 255.0)
+    for row in range(5):
+        for column in range(6):  # the squares between tags
+            y, x = margin + 156 * row, margin + 156 * column
+            picture[y : y + gap, x : x + gap] = 0
+    for number in range(20):
+        row, column = 3 - number // 5, number % 5
+        y, x = margin + gap + 156 * row, margin + gap + 156 * column
+        black = np.rot90(marker_modules(APRILTAGS, number, border=BORDER_SQUARES), way_up)
+        picture[y : y + 120, x : x + 120] = np.where(np.kron(black, np.ones((module, module))), 0, 255)
+    shrunk = 0.15
+    small = cv2.resize(60 + 0.5 * picture, None, fx=shrunk, fy=shrunk, interpolation=cv2.INTER_AREA)
+    noise = np.random.default_rng(0).normal(0.0, 2.0, small.shape)
+    blurred = cv2.GaussianBlur(small, (0, 0), 0.8) + noise
+    low = np.array([margin + gap, margin + gap + 4 * 156 - gap])  # of corner 0, the bottom left
+    corners = (low + board.points()[:, :2] / board.size * 120.0) * shrunk - 0.5
+    return np.clip(blurred, 0, 255).astype(np.uint8), corners
+
+
 @pytest.mark.parametrize("negative", [False, True], ids=["black", "white"])
 @pytest.mark.parametrize("legacy", [False, True], ids=["new", "old"])
 def test_ids_are_known_where_hardly_a_marker_can_be_read(legacy, negative):
@@ -50,6 +74,18 @@ def test_ids_are_known_where_hardly_a_marker_can_be_read(legacy, negative):
     x, y = where(9, 6)[sight.ids].T
     turned = np.stack([y, picture.shape[0] - 1 - x], axis=1)
     assert np.linalg.norm(sight.pixels - turned, axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize("way_up", [0, 2], ids=["OpenCV", "Kalibr"])
+def test_small_tags_are_read_together_whichever_way_up_they_are_printed(way_up):
+    board = AprilGrid(5, 4, 0.03, 0.3)
+    picture, truth = small_aprilgrid(board, way_up)
+    assert len(find_markers(picture, APRILTAGS, 100, border=BORDER_SQUARES).numbers) <= 2  # of 20
+    sight = see(np.ascontiguousarray(picture[::-1, ::-1]), target_of(board))  # upside down
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) >= 76  # of 80
+    turned = np.array(picture.shape[::-1]) - 1 - truth[sight.ids]
+    assert np.linalg.norm(sight.pixels - turned, axis=1).max() < 0.5
 
 
 def test_a_board_with_other_markers_or_none_is_not_taken():

@@ -49,3 +49,21 @@ def test_a_disc_whose_fit_failed_is_not_given_out(seed, number):
     assert np.isfinite(sight.pixels).all()
     assert len(sight.ids) >= 0.7 * len(shown.truth)
     assert errors_of(shown, sight).max() < FALSE_PX
+
+
+def test_lines_that_leap_by_a_knight_s_move_are_parted():
+    """A small slanted board's lattice leapt by two squares and one to the side, as wide as the board."""
+    (shown,) = photographs(1, seed=11, first=1262)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) >= 30
+    assert errors_of(shown, sight).max() < 0.2
+
+
+def test_marks_that_blur_hides_do_not_turn_a_board_into_its_negative():
+    """Discs of two pixels counted as missing, and the negative, whose discs were outside, was taken."""
+    (shown,) = photographs(1, seed=14, first=1155)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) >= 60
+    assert errors_of(shown, sight).max() < 0.5

@@ -17,29 +17,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from orthoscope.detection.chessboards.board_marks import ways_by_marks
-from orthoscope.detection.chessboards.grid import cross, grid_shape, nearest_neighbour
+from orthoscope.detection.chessboards.grid import cross, nearest_neighbour
 from orthoscope.detection.chessboards.lattices import CornerLattice, lattices
 from orthoscope.detection.chessboards.opencv_finders import opencv_boards
 from orthoscope.detection.chessboards.partial_board import (
     Grid,
-    filled,
     grid_of,
-    has_plain_squares,
     is_even,
     laid_out,
     placements,
     without_lost_lines,
 )
+from orthoscope.detection.chessboards.refined_grid import refined_grid
 from orthoscope.detection.saddles.contradicted import are_contradicted
 from orthoscope.detection.saddles.linked import are_linked
-from orthoscope.detection.saddles.refine import Refined, refined
 from orthoscope.detection.saddles.saddle_points import saddle_points
-from orthoscope.detection.saddles.smooth_grid import off_smooth_grid
 from orthoscope.detection.sight import TWICE, Sight, Unseen
-from orthoscope.detection.small_copies import resized, to_photograph
+from orthoscope.detection.small_copies import enlarged, resized, to_photograph
 from orthoscope.geometry.arrays import Bool, Float, InputError, Int, median, ndarray
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.marked_chessboard import MarkedChessboard
@@ -48,12 +46,11 @@ __all__ = ["board_size", "find_chessboard", "see_chessboard"]
 
 # Copies have these longer sides, pixels; most boards are found in the first.
 COPY_SIDES = (640, 320, 1280, 2560)
+# Where so many corners, closer than so many pixels, hang together and make no whole board, a copy twice as
+# large is looked at.
+PROMISING_CORNERS, SMALL_SQUARE = 8, 20.0
 # So many lattices of each copy are looked at, since a chequered shirt may be larger than the board.
 LATTICES_PER_COPY = 2
-# In a poor picture saddles usually explain less of their windows than this.
-LEAST_EXPLAINED = 0.9
-# Boards with smaller steps, pixels, are treated as a poor picture's.
-SMALL_STEP = 12.0
 # A part of a board has at least this many corners.
 FEWEST_PART_CORNERS = 6
 # At least this share of the board's corners hangs together, or trying other finders is not worth while.
@@ -64,18 +61,6 @@ SECOND_BOARD_SHARE = 0.5
 TOO_MANY_RATIO = 1.5
 # Where one lattice has this many times the board's corners, whatever it is, no further copy is looked at.
 FLOOR_RATIO = 6
-# A corner that is off its neighbours' lines is sought again so many times.
-REPAIR_ROUNDS = 2
-# A corner is off its neighbours' lines by at least so many steps, and so many times the usual stray.
-OFF_LIMITS = (0.1, 6.0)
-# A corner that is no saddle is off by at least so many steps, and so many times the usual stray.
-OFF_LIMITS_WITHOUT_SADDLE = (0.04, 3.0)
-# The usual stray is at most this, steps.
-LARGEST_USUAL_STRAY = 0.03
-# No corner that was not seen is sought nearer to the picture's rim than this, pixels.
-RIM_PX = 2.0
-# A part with more than this share of corners that are no saddles is not believed.
-MOST_DOUBTFUL_SHARE = 0.4
 
 
 class _Laid(NamedTuple):
@@ -109,28 +94,30 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             " at least 3x3."
         )
     parts: list[_Laid] = []
-    hanging, open_ = 0, False
+    hanging, open_, fits = 0, False, False
     for found, copy, others in _hanging_together(grey):
         if len(found.pixels) > FLOOR_RATIO * board.columns * board.rows:
             break
         grid = _in_photograph(grey, copy, found, board)
         if grid is None:
             continue
-        if is_even(grey, grid):
-            hanging = max(hanging, int(grid.seen.sum()))
+        seen = int(grid.seen.sum())
+        if any(seen <= part.sure.sum() for part in parts):
+            continue  # of this copy no more can be sure
         sight = _on_board(grey, grid, board)
         open_ |= sight is None
         if sight and len(sight.ids) == board.columns * board.rows:
             large = (other for other in others if len(other.pixels) >= SECOND_BOARD_SHARE * len(sight.ids))
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in large)
             return _sure(grey, sight, board, TWICE if alike else "")
+        if is_even(grey, grid):
+            hanging, fits = max(hanging, seen), fits or _may_be_whole(grey, grid, board)
         parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: int(sight.sure.sum()), default=None)
     count = board.columns * board.rows
-    if ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count and (
-        best is None or len(best.ids) > 0.8 * count
-    ):
-        best = _by_opencv(grey, board) or best
+    enough = ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count
+    if best is None and fits and enough and hanging != count:
+        best = _by_opencv(grey, board)
     if best:
         return _sure(grey, best, board)
     return Unseen("is in it in part only, and which part cannot be told" if open_ else "was not found in it")
@@ -158,9 +145,23 @@ def _in_photograph(
 ) -> Grid | None:
     """The grid of a copy's lattice, in the photograph's pixels; None where nothing is left of it."""
     grid = laid_out(copy, found, max(board.grid)) if len(found.pixels) >= FEWEST_PART_CORNERS else None
-    if grid is None or not has_plain_squares(copy, grid):
-        return None
-    return grid._replace(corners=to_photograph(grid.corners, copy, grey))
+    return grid and grid._replace(corners=to_photograph(grid.corners, copy, grey))
+
+
+def _may_be_whole(grey: ndarray, grid: Grid, board: Chessboard | MarkedChessboard) -> bool:
+    """Whether all of the board is in the picture in one of the ways in which a grid lies on it, or in none
+    that is known.
+    """
+    ways = placements(grid, board.columns, board.rows)
+    far = np.array([board.columns - 1.0, board.rows - 1.0])
+    ends = far * [[0, 0], [1, 0], [1, 1], [0, 1]]
+    for ids in ways:
+        cells = np.stack([ids % board.columns, ids // board.columns], axis=-1).reshape(-1, 2)
+        homography, _ = cv2.findHomography(cells.astype(float), grid.corners.reshape(-1, 2), 0)
+        there = ends if homography is None else cv2.perspectiveTransform(ends[None], homography)[0]
+        if ((there >= 0) & (there <= np.array(grey.shape[::-1]) - 1)).all():
+            return True
+    return not ways
 
 
 def _is_whole(grid: Grid | None, board: Chessboard | MarkedChessboard) -> bool:
@@ -205,15 +206,33 @@ def lattice_sizes(grey: ndarray) -> set[tuple[int, int]]:
 
 
 def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, list[CornerLattice]]]:
-    """The largest lattices of each copy, the copy, and the lattices of it that are smaller."""
-    shapes = set()
+    """The largest lattices of each copy, the copy, and the lattices of it that are smaller; at last of an
+    enlarged one, where squares are small.
+    """
+    shapes, are_small = set(), False
     for side in COPY_SIDES:
         copy = resized(grey, side)
         if copy.shape not in shapes:
             shapes.add(copy.shape)
-            found = lattices(saddle_points(copy))[:LATTICES_PER_COPY]
-            for number, one in enumerate(found, 1):
-                yield one, copy, found[number:]
+            found = _largest(copy)
+            are_small |= bool(found) and copy is grey and _has_small_squares(found[0])
+            yield from ((one, copy, found[number:]) for number, one in enumerate(found, 1))
+    if are_small:
+        found = _largest(copy := enlarged(grey))
+        yield from ((one, copy, found[number:]) for number, one in enumerate(found, 1))
+
+
+def _largest(copy: ndarray) -> list[CornerLattice]:
+    return lattices(saddle_points(copy))[:LATTICES_PER_COPY]
+
+
+def _has_small_squares(found: CornerLattice) -> bool:
+    """Whether many corners hang together, but so close that the circles around them reach into other
+    squares.
+    """
+    if len(found.pixels) < PROMISING_CORNERS:
+        return False
+    return median(nearest_neighbour(found.pixels, found.cells.astype(float))) < SMALL_SQUARE
 
 
 def _on_board(
@@ -227,14 +246,16 @@ def _on_board(
     arms = np.ones(grid.seen.shape)
     if isinstance(board, MarkedChessboard):
         negative = placements(grid, board.columns, board.rows, negative=True)
-        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(grey, grid, negative, board)
+        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(
+            grey, grid, negative, board, only_seen=True
+        )
     if not ways or not _alike(ways, grid.seen, board.symmetries()):
         return None
     whole = grid.seen.size == board.columns * board.rows
     ids = _first_way(ways, grid.corners, whole)
     if isinstance(board, MarkedChessboard):
         arms[np.isin(ids, board.marked_corners())] = board.arm
-    pixels, good, *evidence = _refined(grey, grid.corners, grid.seen, arms)
+    pixels, good, *evidence = refined_grid(grey, grid.corners, grid.seen, arms)
     if (less := without_lost_lines(grey, grid, pixels, good, max(board.grid))) and again:
         return _on_board(grey, less, board, again=False)
     order = np.argsort(ids[good])
@@ -255,108 +276,6 @@ def _first_way(ways: list[ndarray], corners: ndarray, whole: bool) -> Int[ndarra
         return min(ways, key=lambda ids: corners[ids == 0].sum())
     across = corners.sum(-1) - corners.sum(-1).mean()
     return max(ways, key=lambda ids: float((ids * across).sum()))
-
-
-def _refined(
-    grey: ndarray,
-    corners: Float[ndarray, "r c 2"],
-    seen: Bool[ndarray, "r c"],
-    arms: Float[ndarray, "r c"],
-) -> tuple[
-    Float[ndarray, "r c 2"],
-    Bool[ndarray, "r c"],
-    Bool[ndarray, "r c"],
-    Float[ndarray, "r c"],
-    Bool[ndarray, "r c"],
-]:
-    """The grid's corners in the photograph, which of them are good, which of these are sure, how far they
-    spread, and which have plain windows.
-    """
-    inside = ((corners >= RIM_PX) & (corners <= np.array(grey.shape[::-1]) - 1 - RIM_PX)).all(-1)
-    row, column = np.nonzero(seen | inside)
-    places = np.stack([column, row], axis=1).astype(float)
-    fine = refined(grey, corners[row, column], places, arm=arms[row, column])
-    off = _off(fine, places)
-    for _ in range(REPAIR_ROUNDS):
-        if not off.any() or off.all():
-            break
-        known = np.full_like(corners, np.nan)
-        known[row[~off], column[~off]] = fine.pixels[~off]
-        start = np.where(off[:, None], filled(known)[row, column], fine.pixels)
-        again = refined(grey, start, places, approach=False, arm=arms[row, column])
-        fine = fine.with_others(off, again)
-        off = _off(fine, places)
-    fine, off = _on_smooth_grid(grey, fine, places, off, arms[row, column])
-    off = _without_strays(fine, places, off)
-    good = np.zeros_like(seen)
-    good[row, column] = ~off & (seen[row, column] | fine.believed)
-    if not good.all() and (~fine.believed[good[row, column]]).mean() > MOST_DOUBTFUL_SHARE:
-        good[:] = False
-    pixels = corners.copy()
-    pixels[row, column] = fine.pixels
-    sure, plain, spread = np.zeros_like(seen), np.zeros_like(seen), np.zeros(seen.shape)
-    sure[row, column] = fine.sure & fine.whole
-    spread[row, column], plain[row, column] = fine.spread, fine.plain
-    return pixels, good, sure, spread, plain
-
-
-def _on_smooth_grid(
-    grey: ndarray,
-    fine: Refined,
-    places: Float[ndarray, "m 2"],
-    off: Bool[ndarray, " m"],
-    arms: Float[ndarray, " m"],
-) -> tuple[Refined, Bool[ndarray, " m"]]:
-    """The corners, those that are off where all others foresee them sought again from there; and which stay
-    off.
-    """
-    on = np.flatnonzero(~off)
-    if not len(on):
-        return fine, off
-    step = median(nearest_neighbour(fine.pixels[on], places[on]))
-    poor = median(fine.explained[on]) < LEAST_EXPLAINED or step < SMALL_STEP
-    away, foreseen, limit = off_smooth_grid(
-        fine.pixels[on], places[on], step, doubtful=~fine.believed[on], poor=poor
-    )
-    if not away.any():
-        return fine, off
-    start, off = np.where(away[:, None], foreseen, fine.pixels[on]), off.copy()
-    again = refined(grey, start, places[on], approach=False, arm=arms[on])
-    moved = np.hypot(*(again.pixels - foreseen).T)
-    off[on[away]] = ((moved > limit) | ~again.believed)[away]
-    fine = Refined(*(part.copy() for part in fine))
-    for part, new in zip(fine, again, strict=True):
-        part[on[away]] = new[away]
-    return fine, off
-
-
-def _without_strays(
-    fine: Refined, places: Float[ndarray, "m 2"], off: Bool[ndarray, " m"]
-) -> Bool[ndarray, " m"]:
-    """Which corners are off once the lines are laid through those that are not, the worst first."""
-    off = off.copy()
-    for _ in range(len(off)):
-        on = np.flatnonzero(~off)
-        if len(on) < FEWEST_PART_CORNERS:
-            break
-        some = fine.of(on)
-        strays = _off(some, places[on])
-        if not strays.any():
-            break
-        stray = grid_shape(some.pixels, places[on]).stray
-        off[on[np.where(strays, stray, 0.0).argmax()]] = True
-    return off
-
-
-def _off(fine: Refined, places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
-    """Which corners are off their neighbours' lines by more than is usual, no saddles sooner."""
-    stray = grid_shape(fine.pixels, places).stray
-    usual = min(median(stray), LARGEST_USUAL_STRAY)
-    return stray > np.where(
-        fine.believed,
-        max(OFF_LIMITS[0], OFF_LIMITS[1] * usual),
-        max(OFF_LIMITS_WITHOUT_SADDLE[0], OFF_LIMITS_WITHOUT_SADDLE[1] * usual),
-    )
 
 
 def _by_opencv(grey: ndarray, board: Chessboard | MarkedChessboard) -> _Laid | None:

@@ -42,6 +42,10 @@ class GridShape(NamedTuple):
     bend_down: Float[ndarray, " m"]
     stray: Float[ndarray, " m"]
 
+    def of(self, which: ndarray) -> GridShape:
+        """At some of them."""
+        return GridShape(*(part[which] for part in self))
+
 
 @cache
 def lattice(columns: int, rows: int) -> Float[ndarray, "m 2"]:
@@ -78,6 +82,12 @@ def _slopes(count: int) -> Float[ndarray, "count count"]:
 
 def nearest_neighbour(corners: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Float[ndarray, " m"]:
     """The shortest step from each corner towards those next to it in its row and column, pixels."""
+    if whole := _full(places):
+        grid, gaps = corners.reshape(*whole, 2), np.full((whole[0] + 1, whole[1] + 1, 2), np.inf)
+        gaps[:-1, 1:-1, 0] = np.hypot(*(grid[:, 1:] - grid[:, :-1]).transpose(2, 0, 1))
+        gaps[1:-1, :-1, 1] = np.hypot(*(grid[1:] - grid[:-1]).transpose(2, 0, 1))
+        along = np.minimum(gaps[:-1, 1:, 0], gaps[:-1, :-1, 0])
+        return np.minimum(along, np.minimum(gaps[1:, :-1, 1], gaps[:-1, :-1, 1])).ravel()
     nearest = np.full(len(corners), np.inf)
     for axis in (0, 1):
         for line in _lines(places, axis):
@@ -114,6 +124,14 @@ def _along_lines(
 
     A corner that is alone on its line has the slope of the corner nearest to it that is not.
     """
+    if whole := _full(places):
+        grid = corners.reshape(*whole, 2)
+        lines = grid.transpose(1, 0, 2) if axis else grid
+        steps = tuple(map(float, range(lines.shape[1])))
+        matrices = (*_polynomials(steps, *EXACT_FIT)[1:], _polynomials(steps, *SMOOTH_FIT)[0])
+        told = (matrix @ lines for matrix in matrices)
+        slope, turn, smooth = (one.transpose(1, 0, 2) if axis else one for one in told)
+        return slope.reshape(-1, 2), turn.reshape(-1, 2), smooth.reshape(-1, 2)
     slope, turn, smooth = np.full_like(corners, np.nan), np.zeros_like(corners), corners.copy()
     groups: dict[tuple[float, ...], list[ndarray]] = {}
     for line in _lines(places, axis):
@@ -132,6 +150,16 @@ def _along_lines(
         apart = np.abs(places[alone, None] - places[~alone]).sum(-1)
         slope[alone] = slope[~alone][apart.argmin(1)]
     return slope, turn, smooth
+
+
+def _full(places: Float[ndarray, "m 2"]) -> tuple[int, int] | None:
+    """Rows and columns, two at least, of a full grid whose places stand row by row; None for any other."""
+    if not len(places):
+        return None
+    columns, rows = (int(count) + 1 for count in places[-1] - places[0])
+    if min(rows, columns) < 2 or rows * columns != len(places):
+        return None
+    return (rows, columns) if np.array_equal(places - places[0], lattice(columns, rows)) else None
 
 
 def _lines(places: Float[ndarray, "m 2"], axis: int) -> list[ndarray]:

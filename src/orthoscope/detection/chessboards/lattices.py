@@ -16,7 +16,7 @@ import numpy as np
 from orthoscope.detection.saddles.saddle_points import SaddlePoints
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
-__all__ = ["CornerLattice", "lattices"]
+__all__ = ["LONGEST_STEP", "CornerLattice", "lattices"]
 
 # So many of the nearest corners may be neighbours.
 NEIGHBOUR_CANDIDATES = 16
@@ -48,11 +48,16 @@ class CornerLattice(NamedTuple):
         return int(columns), int(rows)
 
 
-def lattices(points: SaddlePoints) -> list[CornerLattice]:
-    """What hangs together, the most corners first."""
+def lattices(points: SaddlePoints, longest_step: float = LONGEST_STEP) -> list[CornerLattice]:
+    """What hangs together, the most corners first.
+
+    Args:
+        points: corners of four squares.
+        longest_step: a link is at most so many times as long as the next one of its line.
+    """
     if len(points.pixels) < FEWEST_LATTICE_CORNERS:
         return []
-    links = _single_steps(_mutual(_neighbours(points)), points.pixels)
+    links = _single_steps(_mutual(_neighbours(points)), points.pixels, longest_step)
     left, count = np.ones(len(links), dtype=bool), (links >= 0).sum(1)
     listed, edges = links.tolist(), points.edges.tolist()
     found = []
@@ -74,26 +79,21 @@ def _neighbours(points: SaddlePoints) -> Int[ndarray, "n 4"]:
     square = (pixels * pixels).sum(1)
     apart = square[:, None] + square - 2.0 * pixels @ pixels.T
     np.fill_diagonal(apart, np.inf)
-    near = np.argpartition(apart, few - 1, axis=1)[:, :few]
-    step = pixels[near] - pixels[:, None]
-    far = np.hypot(step[..., 0], step[..., 1])
-    heading = np.arctan2(step[..., 1], step[..., 0])
-    swapped = points.edges[near][..., ::-1]
-    alike = (_between(swapped, points.edges[:, None]) < WIDEST_TURN).all(-1)
+    rows, others = np.nonzero(apart <= np.partition(apart, few - 1, axis=1)[:, few - 1 : few])
+    turns = np.exp(2j * points.edges)  # the same for both directions along an edge
+    alike = (turns[others, ::-1] * turns[rows].conj()).real.min(1) > np.cos(2.0 * WIDEST_TURN)
+    rows, others = rows[alike], others[alike]
+    step = pixels[others] - pixels[rows]
+    heading, far = np.arctan2(step[:, 1], step[:, 0]), np.hypot(step[:, 0], step[:, 1])
+    off = np.abs((heading - points.edges[rows].T + np.pi) % (2 * np.pi) - np.pi)
     links = np.full((count, 4), -1)
-    for way in range(4):
-        edge = points.edges[:, way % 2] + (np.pi if way > 1 else 0.0)
-        off = np.abs((heading - edge[:, None] + np.pi) % (2 * np.pi) - np.pi)
-        length = np.where(alike & (off < WIDEST_TURN), far * (1.0 + off), np.inf)
-        best = length.argmin(1)
-        rows = np.arange(count)
-        links[:, way] = np.where(np.isfinite(length[rows, best]), near[rows, best], -1)
+    for way, turned in enumerate((*off, *(np.pi - off))):
+        length = np.where(turned < WIDEST_TURN, far * (1.0 + turned), np.inf)
+        least = np.full(count, np.inf)
+        np.minimum.at(least, rows, length)
+        nearest = (length == least[rows]) & (turned < WIDEST_TURN)
+        links[rows[nearest], way] = others[nearest]
     return links
-
-
-def _between(one: ndarray, other: ndarray) -> ndarray:
-    """The angle between two lines, radians."""
-    return np.abs((one - other + 0.5 * np.pi) % np.pi - 0.5 * np.pi)
 
 
 def _mutual(links: Int[ndarray, "n 4"]) -> Int[ndarray, "n 4"]:
@@ -102,12 +102,14 @@ def _mutual(links: Int[ndarray, "n 4"]) -> Int[ndarray, "n 4"]:
     return np.where((links >= 0) & back, links, -1)
 
 
-def _single_steps(links: Int[ndarray, "n 4"], pixels: Float[ndarray, "n 2"]) -> Int[ndarray, "n 4"]:
+def _single_steps(
+    links: Int[ndarray, "n 4"], pixels: Float[ndarray, "n 2"], longest: float
+) -> Int[ndarray, "n 4"]:
     """The links without those that leap over corners that are not seen, as behind a mark: they are much
     longer than the next link of their line.
     """
     length = np.where(links >= 0, np.linalg.norm(pixels[links] - pixels[:, None], axis=-1), np.inf)
-    return _mutual(np.where(length > LONGEST_STEP * np.roll(length, 2, axis=1), -1, links))
+    return _mutual(np.where(length > longest * np.roll(length, 2, axis=1), -1, links))
 
 
 def _spread(

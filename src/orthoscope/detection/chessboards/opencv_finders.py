@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.chessboards.grid import cross, grid_shape, lattice
-from orthoscope.detection.chessboards.partial_board import alternating
+from orthoscope.detection.chessboards.squares import alternating
 from orthoscope.detection.small_copies import resized, to_photograph
 from orthoscope.geometry.arrays import Float, ndarray
 

@@ -14,24 +14,22 @@ board's own symmetry, give the ids; more than one leave them open.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
-from orthoscope.detection.chessboards.grid import grid_shape, one_line_more, steps_of
+from orthoscope.detection.chessboards.grid import grid_shape, one_line_more
 from orthoscope.detection.chessboards.lattices import CornerLattice
+from orthoscope.detection.chessboards.squares import alternating, plain_part
 from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 
 __all__ = [
     "Grid",
-    "alternating",
     "filled",
     "grid_of",
-    "has_plain_squares",
     "is_even",
     "laid_out",
+    "on_lines",
     "placements",
     "without_lost_lines",
     "without_strays",
@@ -53,30 +51,12 @@ GOING_ON_SHARE = 0.6
 BLANK_SQUARES_SHARE = 0.75
 # A line at the rim with fewer than three corners, and less than this share of the next line's, is chance.
 THIN_LINE_SHARE = 0.34
-# Where squares are looked at, as shares of their sides.
-PLACES_IN_SQUARE = (0.3, 0.5, 0.7)
-# The place with the least contrast of bright to dark squares has at least this share of the greatest.
-LEAST_PLAIN_SHARE = 0.37
-# Of the squares of a strip whose corners are all seen more than this share is plain, or there is a fault.
-LEAST_PLAIN_SQUARES_SHARE = 0.5
 # So many lines more are needed for the shape of those.
 SHAPING_LINES = 2
 # The usual difference of corners' strengths from their median is less than this share of it on a board.
 MOST_UNEVENNESS = 0.45
 # A line is compared with so many lines before it.
 COMPARED_LINES = 4
-# In the four squares around a corner the grey is looked at so far from their sides, squares.
-STEPS_INTO_SQUARE = (0.15, 0.25, 0.35)
-# Weights (3, 36) of the corner, its step along the row and its step along the column: nine places in each of
-# the four squares, those of one colour first.
-PLACES_IN_SQUARES = np.array(
-    [
-        (1.0, across * step, up * other)
-        for across, up in ((1, 1), (-1, -1), (1, -1), (-1, 1))
-        for step in STEPS_INTO_SQUARE
-        for other in STEPS_INTO_SQUARE
-    ]
-).T
 
 
 class Grid(NamedTuple):
@@ -114,16 +94,31 @@ def laid_out(grey: ndarray, found: CornerLattice, most: int) -> Grid | None:
     seen = np.isfinite(corners[..., 0])
     seen &= _stands(grey, filled(corners), bright)
     corners[~seen] = np.nan
-    box = _box(seen)
-    if box is None:
+    boxed = _boxed(corners, bright)
+    if boxed is None:
         return None
-    bright ^= bool((box[0].start + box[1].start) % 2)
-    grid, seen = filled(corners[box]), seen[box]
-    seen |= _stands(grey, grid, bright)
-    part = _without_faults(grey, grid, seen, bright)
-    bright ^= bool((part[0].start + part[1].start) % 2)
-    grid, seen = grid[part], seen[part]
+    corners, bright = boxed
+    grid = filled(corners)
+    seen = np.isfinite(corners[..., 0]) | _stands(grey, grid, bright)
+    part = plain_part(grey, grid, seen, bright)
+    if part is None:
+        return None
+    if part != tuple(slice(0, count) for count in seen.shape):  # what foresaw its gaps may be gone
+        bright ^= bool((part[0].start + part[1].start) % 2)
+        boxed = _boxed(np.where(seen[..., None], grid, np.nan)[part], bright)
+        if boxed is None:
+            return None
+        corners, bright = boxed
+        grid, seen = filled(corners), np.isfinite(corners[..., 0])
     return _taken_further(grey, grid, seen, bright, most)
+
+
+def _boxed(
+    corners: Float[ndarray, "r c 2"], bright: bool
+) -> tuple[Float[ndarray, "rows columns 2"], bool] | None:
+    """The rows and columns with corners, and whether their first square is the bright one; None without."""
+    box = _box(np.isfinite(corners[..., 0]))
+    return (corners[box], bright ^ bool((box[0].start + box[1].start) % 2)) if box else None
 
 
 def placements(grid: Grid, columns: int, rows: int, *, negative: bool = False) -> list[Int[ndarray, "r c"]]:
@@ -228,18 +223,31 @@ def _foreseen(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "12 r c 2"]:
 
 
 def without_strays(found: CornerLattice) -> CornerLattice | None:
-    """The lattice without corners that are off their neighbours' lines, the worst first."""
-    pixels, cells, bright = found
+    """The lattice without corners that are off their neighbours' lines; None where hardly any is left."""
+    keep = on_lines(found.pixels, found.cells.astype(float))
+    if keep is None:
+        return None
+    cells = found.cells[keep]
+    return CornerLattice(found.pixels[keep], cells - cells.min(0), found.bright[keep])
+
+
+def on_lines(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"] | None:
+    """Which corners of a lattice are on their neighbours' lines, the worst taken out first; None where hardly
+    any is.
+
+    Args:
+        pixels: the corners.
+        places: column and row of each in the lattice, in steps.
+    """
+    keep = np.arange(len(pixels))
     for _ in range(CLEARING_ROUNDS):
-        if len(pixels) < max(4, LEAST_LEFT_SHARE * len(found.pixels)):
+        if len(keep) < max(4, LEAST_LEFT_SHARE * len(pixels)):
             return None
-        stray = grid_shape(pixels, cells.astype(float)).stray
+        stray = grid_shape(pixels[keep], places[keep]).stray
         if stray.max() <= FARTHEST_STRAY_SHARE:
             break
-        keep = stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())
-        pixels, cells, bright = pixels[keep], cells[keep], bright[keep]
-    cells = cells - cells.min(0)
-    return CornerLattice(pixels, cells, bright)
+        keep = keep[stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())]
+    return np.isin(np.arange(len(pixels)), keep)
 
 
 def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:
@@ -299,72 +307,6 @@ def is_even(grey: ndarray, grid: Grid) -> bool:
     return usual > 0 and median(np.abs(strength - usual)) < MOST_UNEVENNESS * usual
 
 
-def has_plain_squares(grey: ndarray, grid: Grid) -> bool:
-    """Whether a grid's squares are bright and dark by turns all over, in the mean of each of nine places in
-    them.
-
-    Where a board is seen small and slanted a lattice may link every other corner, or middles of squares: its
-    own squares are then parts of several.
-    """
-    bright = _bright_squares(grid.seen.shape, grid.bright)
-    if bright.all() or not bright.any():
-        return True
-    values = _in_squares(grey, grid.corners)
-    if values is None:
-        return False
-    contrast = values[:, bright].mean(1) - values[:, ~bright].mean(1)
-    return bool(contrast.min() > LEAST_PLAIN_SHARE * contrast.max())
-
-
-def _without_faults(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool) -> tuple[slice, slice]:
-    """Rows and columns of the part without faults: strips of squares, from side to side, that are not plain.
-
-    Where squares are small and slanted, links may leap from a corner to one that is a square farther to the
-    side; on both sides of them the lattice is right, but its lines do not belong together.
-    """
-    rows, columns = (slice(0, count) for count in seen.shape)
-    colours = _bright_squares(seen.shape, bright)
-    whole = seen[:-1, :-1] & seen[1:, :-1] & seen[:-1, 1:] & seen[1:, 1:]
-    if not (whole & colours).any() or not (whole & ~colours).any():
-        return rows, columns
-    values = _in_squares(grey, grid)
-    if values is None:
-        return rows, columns
-    level = 0.5 * (median(values[:, whole & colours]) + median(values[:, whole & ~colours]))
-    plain = whole & np.where(colours, values.min(0) > level, values.max(0) < level)
-    for axis in (0, 1):
-        known, right = whole.sum(1 - axis), plain.sum(1 - axis)
-        faults = np.flatnonzero((known > 0) & (right <= LEAST_PLAIN_SQUARES_SHARE * known)) + 1
-        ends = [0, *faults.tolist(), seen.shape[axis]]
-        parts = [slice(start, end) for start, end in pairwise(ends)]
-        lines = seen.sum(1 - axis)
-        most = max(parts, key=lambda part: lines[part].sum())
-        rows, columns = (most, columns) if axis == 0 else (rows, most)
-    return rows, columns
-
-
-def _bright_squares(shape: tuple[int, ...], bright: bool) -> Bool[ndarray, "a b"]:
-    """Which squares between a grid's corners are the bright ones."""
-    return (np.add.outer(np.arange(shape[0] - 1), np.arange(shape[1] - 1)) % 2 == 0) == bright
-
-
-def _in_squares(grey: ndarray, corners: Float[ndarray, "r c 2"]) -> Float[ndarray, "9 a b"] | None:
-    """The grey of nine places in each square between a grid's corners; None where that is not in the
-    picture.
-    """
-    u, v = (part.reshape(-1, 1, 1, 1) for part in np.meshgrid(PLACES_IN_SQUARE, PLACES_IN_SQUARE))
-    places = (1 - v) * ((1 - u) * corners[:-1, :-1] + u * corners[:-1, 1:])
-    places += v * ((1 - u) * corners[1:, :-1] + u * corners[1:, 1:])
-    low = np.maximum(np.floor(places.reshape(-1, 2).min(0)) - 4, 0).astype(int)
-    high = np.maximum(np.ceil(places.reshape(-1, 2).max(0)) + 5, low + 1).astype(int)
-    part = cv2.GaussianBlur(grey[low[1] : high[1], low[0] : high[0]], (0, 0), 1.0)
-    if not part.size:
-        return None
-    x, y = (places - low).reshape(len(places), -1, 2).astype(np.float32).transpose(2, 0, 1)
-    values = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
-    return values.reshape(places.shape[:3])
-
-
 def _next_line_stands(grey: ndarray, more: ndarray, bright: bool) -> ndarray:
     """Which corners of the last row are the board's, as those of the rows before it are."""
     first = max(0, len(more) - 1 - COMPARED_LINES - SHAPING_LINES) // 2 * 2  # even, for the signs
@@ -402,33 +344,3 @@ def _ends(grey: ndarray, grid: ndarray) -> bool:
 
 def _in_picture(grey: ndarray, places: ndarray) -> ndarray:
     return np.all((places >= 0) & (places <= np.array(grey.shape[::-1]) - 1), axis=-1)
-
-
-def alternating(grey: ndarray, grid: ndarray) -> Float[ndarray, "r c"]:
-    """How much brighter the square between +column and +row and its opposite are than the two others, grey
-    levels, every other corner's sign turned: a board has one sign throughout. 0 where they are not two and
-    two.
-    """
-    rows, columns = grid.shape[:2]
-    strength = strengths(grey, grid)
-    return strength * np.where(np.add.outer(np.arange(rows), np.arange(columns)) % 2, -1.0, 1.0)
-
-
-def strengths(grey: ndarray, grid: ndarray) -> Float[ndarray, "r c"]:
-    """How much brighter the square between +column and +row and its opposite are than the two others, grey
-    levels.
-
-    Negative where they are darker; 0 where the four squares are not two and two, or one of them is not in the
-    picture.
-    """
-    rows, columns = grid.shape[:2]
-    along, down = steps_of(grid)
-    at = np.stack([grid, along, down]).reshape(3, -1, 2).transpose(2, 1, 0) @ PLACES_IN_SQUARES  # (2, m, 36)
-    height, width = grey.shape
-    x, y = np.rint(np.clip(at, -9e5, 9e5)).astype(int)
-    inside = ((x >= 0) & (x < width) & (y >= 0) & (y < height)).all(1)
-    seen = grey.ravel().take(y * width + x, mode="clip")
-    one, two, three, four = seen.reshape(len(seen), 4, -1).mean(-1).T  # the first two are of one colour
-    bright = np.minimum(one, two) - np.maximum(three, four)
-    dark = np.minimum(three, four) - np.maximum(one, two)
-    return np.where(inside, np.maximum(bright, 0.0) - np.maximum(dark, 0.0), 0.0).reshape(rows, columns)

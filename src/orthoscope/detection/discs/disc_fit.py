@@ -77,6 +77,7 @@ class FittedDiscs(NamedTuple):
         spread: (n,12) the standard deviation of that by noise, pixels.
         blur: (n,) w, pixels.
         centre_spread: (n,) standard deviation of a centre by noise, pixels.
+        rest: (n,) rms of what the fit leaves of the picture, in half steps from inside to outside.
     """
 
     ellipses: Ellipses
@@ -84,6 +85,7 @@ class FittedDiscs(NamedTuple):
     spread: Float[ndarray, "n 12"]
     blur: Float[ndarray, " n"]
     centre_spread: Float[ndarray, " n"]
+    rest: Float[ndarray, " n"]
 
 
 def fit_discs(grey: ndarray, rough: Ellipses) -> FittedDiscs:
@@ -96,7 +98,7 @@ def fit_discs(grey: ndarray, rough: Ellipses) -> FittedDiscs:
     count = len(rough.centres)
     if not count:
         none = np.zeros((0, SECTORS))
-        return FittedDiscs(rough, none, none, np.zeros(0), np.zeros(0))
+        return FittedDiscs(rough, none, none, *np.zeros((3, 0)))
     shrink = max(1, round(median(np.sqrt(np.abs(np.linalg.det(rough.axes)))) / USUAL_RADIUS))
     first, part = _surroundings(grey, rough)
     height, width = (side // shrink for side in part.shape)
@@ -107,7 +109,8 @@ def fit_discs(grey: ndarray, rough: Ellipses) -> FittedDiscs:
     centres = (fit.centres + 0.5) * shrink - 0.5 + first
     outlines = Ellipses(centres, fit.axes * shrink)
     lengths = fit.off, fit.off_spread, fit.blur, fit.centre_spread
-    return FittedDiscs(outlines, *(length * shrink for length in lengths))
+    rest = np.sqrt(fit.noise) / np.abs(fit.step)
+    return FittedDiscs(outlines, *(length * shrink for length in lengths), rest)
 
 
 def _surroundings(grey: ndarray, discs: Ellipses) -> tuple[Int[ndarray, " 2"], ndarray]:

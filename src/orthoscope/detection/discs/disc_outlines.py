@@ -50,6 +50,9 @@ MOST_SECTOR_RADII, MOST_SECTOR_SPREADS = 0.02, 4.0
 # What is usual of all discs counts as noise, too: print and sharpening make outlines ragged; up to this share
 # of a radius.
 MOST_RAGGED_RADII = 0.1
+# A fit leaves less of the picture than this, half steps from inside to outside, or than so many times what is
+# usual: the edge of a shadow, glare or a finger moves a disc that it crosses.
+MOST_REST, TIMES_USUAL_REST = 0.1, 3.0
 # At least this share of the rays meets the outline.
 LEAST_RAYS_SHARE = 0.9
 
@@ -128,7 +131,7 @@ def outlines_near(smooth: ndarray, rough: Ellipses) -> Outlines:
 
 def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     """Outlines by rays, each fitted to all pixels about it, but for discs hardly wider than the blur; NaN
-    where one is not whole in the picture, a sector of it is off, or noise hides where it is.
+    where one is not whole in the picture, something lies over it, or noise hides where it is.
 
     Args:
         grey: (h,w) uint8.
@@ -147,7 +150,8 @@ def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
         MOST_SECTOR_RADII * size[:, None],
         np.minimum(most, MOST_RAGGED_RADII * size[:, None] + MOST_SECTOR_SPREADS * fit.spread),
     )
-    smooth = ((np.abs(fit.off) < off).all(1) | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
+    clean = fit.rest < max(MOST_REST, TIMES_USUAL_REST * median(fit.rest))
+    smooth = ((np.abs(fit.off) < off).all(1) & clean | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
     centres, axes = found.centres.copy(), found.axes.copy()
     centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
     centres[which[~smooth]], axes[which[~smooth]] = np.nan, np.nan

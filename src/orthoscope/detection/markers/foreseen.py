@@ -1,14 +1,16 @@
 """Where corners of a board of markers foresee others: which are off, and where those next to them must be.
 
-A board's image is a homography and a smooth rest: a lens and a wavy board make a polynomial of low order. Of
-which order is told by the corners: each is foreseen by all others (with h its own weight in the fit, by the
-residual over 1 - h), and the order is taken with which they usually are foreseen best. Then
+A board's image is a homography seen by a lens that bends as its corners say best (one number, Fitzgibbon's
+division model), and a smooth rest: the lens's own shape and a wavy board make a polynomial. With one of each
+order up to the fifth a corner is foreseen by all others (with h its own weight in the fit, by the residual
+over 1 - h). Then
 
     a corner is off by        the distance from where it is foreseen
     others miss by            usual / sqrt(1 - h), more at the board's own corners, which weigh most
-    orders beyond may add     as much as the last order moves what is foreseen there
+    orders beyond may add     as much as the next ones move what is foreseen there, or this one did
 
-and what is farther off than all that together was mistaken. The worst is taken out until none is left.
+and what is for any order farther off than all that together was mistaken: low orders are coarse and certain,
+high ones fine, and lenient at the board's corners. The worst is taken out until none is left.
 
 Corners that are not known yet are foreseen by the nearest ones that are, by a polynomial.
 """
@@ -26,10 +28,19 @@ __all__ = ["are_off", "next_corners"]
 TIMES_USUAL = 6.0
 # And beyond at least this, pixels.
 LEAST_PX = 0.6
+# An order is compared with the one before and so many beyond it: of a lens every other one is small.
+ORDERS_BEYOND = 2
 # The highest order of the polynomial, and so many corners to each of its terms.
 MOST_ORDER, CORNERS_PER_TERM = 5, 2
 # A corner's own weight in a fit counts as at most this.
 MOST_WEIGHT = 0.98
+# How a lens may bend, by the share by which half the picture's diagonal is shorter than straight: from a
+# cushion to a fisheye.
+BENDS = (-0.1, 0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9)
+# What is straightened farther than this is at the horizon.
+LEAST_STRAIGHTENED = 0.05
+# Fewer corners say nothing of each other.
+FEWEST_CORNERS = 8
 # At most this share of the corners is taken out.
 MOST_OUT_SHARE = 0.3
 # Where a further order adds less than this to a direction that lower ones have, it is no further one.
@@ -68,45 +79,71 @@ def next_corners(
     return missing, np.linalg.solve(turned @ terms + held, turned @ pixels[nearest])[:, 0]
 
 
-def are_off(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"]:
+def are_off(
+    pixels: Float[ndarray, "m 2"],
+    places: Float[ndarray, "m 2"],
+    shape: tuple[int, ...],
+    *,
+    least: float = LEAST_PX,
+) -> Bool[ndarray, " m"]:
     """Which corners are off.
 
     Args:
         pixels: the corners.
         places: where the board has them.
+        shape: of the picture.
+        least: what is no farther off is not off, pixels.
     """
     off = np.zeros(len(pixels), dtype=bool)
+    if len(pixels) < FEWEST_CORNERS or not np.ptp(places, axis=0).all():
+        return off
+    centre, radius = 0.5 * np.array(shape[1::-1]), 0.5 * float(np.hypot(*shape[:2]))
+    bent = min(BENDS, key=lambda bend: _bent_apart((pixels - centre) / radius, places, bend))
     while off.sum() <= MOST_OUT_SHARE * len(off):
-        excess = _excess(pixels[~off], places[~off])
-        if excess is None or excess.max() <= 1.0:
+        flat = _bent((pixels[~off] - centre) / radius, places[~off], bent) * radius + centre
+        excess = _excess(pixels[~off] - flat, places[~off], least)
+        if excess.max() <= 1.0:
             break
         off[np.flatnonzero(~off)[excess.argmax()]] = True
     return off
 
 
-def _excess(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Float[ndarray, " m"] | None:
-    """How far each corner is off, over what is allowed there; None where too few corners tell."""
-    orders = [order for order in range(1, MOST_ORDER + 1) if CORNERS_PER_TERM * _count(order) <= len(pixels)]
-    if not orders or not (size := np.ptp(places, axis=0)).all():
-        return None
-    homography = cv2.findHomography(places, pixels, 0)[0]
+def _bent_apart(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], bend: float) -> float:
+    """How far corners usually are from a board seen by a lens that bends so."""
+    return median(np.hypot(*(_bent(pixels, places, bend) - pixels).T))
+
+
+def _bent(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], bend: float) -> Float[ndarray, "m 2"]:
+    """Where a lens that bends so has the corners of a flat board: r_straight = r / (1 - bend r^2)."""
+    straight = pixels / np.maximum(1.0 - bend * (pixels**2).sum(1), LEAST_STRAIGHTENED)[:, None]
+    homography, _ = cv2.findHomography(places, straight, 0)
     if homography is None:
-        return None
-    rest = pixels - cv2.perspectiveTransform(places[None].astype(float), homography)[0]
-    x, y = (2.0 * (places - places.min(0)) / size - 1.0).T
+        return np.full_like(pixels, np.inf)
+    there = cv2.perspectiveTransform(places[None].astype(float), homography)[0]
+    away = np.hypot(*there.T)
+    return there * (2.0 / (1.0 + np.sqrt(1.0 + 4.0 * bend * away**2)))[:, None]
+
+
+def _excess(rest: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], least: float) -> Float[ndarray, " m"]:
+    """How far each corner is off, over what is allowed there, by what a flat board leaves."""
+    orders = [order for order in range(1, MOST_ORDER + 1) if CORNERS_PER_TERM * _count(order) <= len(rest)]
+    x, y = (2.0 * (places - places.min(0)) / np.maximum(np.ptp(places, axis=0), 1e-9) - 1.0).T
     powers = [x ** (order - i) * y**i for order in range(orders[-1] + 1) for i in range(order + 1)]
     basis, triangle = np.linalg.qr(np.stack(powers, axis=1))
-    basis = basis * (np.abs(np.diag(triangle)) > LEAST_INDEPENDENT * np.sqrt(len(pixels)))
-    weights, off = [], []
+    basis = basis * (np.abs(np.diag(triangle)) > LEAST_INDEPENDENT * np.sqrt(len(rest)))
+    off, weights = [], []
     for order in orders:
         some = basis[:, : _count(order)]
         weights.append(np.minimum((some * some).sum(1), MOST_WEIGHT))
         off.append((rest - some @ (some.T @ rest)) / (1.0 - weights[-1])[:, None])
-    usual = [median(np.hypot(*one.T)) for one in off]
-    best = int(np.argmin(usual))
-    beyond = np.hypot(*(off[best] - off[max(best - 1, 0)]).T)
-    missed = np.maximum(TIMES_USUAL * usual[best] / np.sqrt(1.0 - weights[best]), LEAST_PX)
-    return np.hypot(*off[best].T) / (missed + beyond)
+    excess = np.zeros(len(rest))
+    for number, (here, weight) in enumerate(zip(off, weights, strict=True)):
+        residual = np.hypot(*here.T)
+        missed = np.maximum(TIMES_USUAL * median(residual) / np.sqrt(1.0 - weight), least)
+        others = np.stack(off[max(number - 1, 0) : number + ORDERS_BEYOND + 1])
+        beyond = np.hypot(*(others - here).transpose(2, 0, 1)).max(0)
+        excess = np.maximum(excess, residual / (missed + beyond))
+    return excess
 
 
 def _count(order: int) -> int:

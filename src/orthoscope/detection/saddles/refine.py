@@ -20,9 +20,9 @@ from orthoscope.detection.chessboards.grid import GridShape, grid_shape, nearest
 from orthoscope.detection.noise import noise_variance
 from orthoscope.detection.saddles.saddle import Saddles, fit_saddles
 from orthoscope.detection.saddles.saddle_arms import SaddleArms, saddle_arms
-from orthoscope.geometry.arrays import Bool, Float, distinct, median, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, distinct, median, ndarray
 
-__all__ = ["Refined", "refined"]
+__all__ = ["WIDEST_SPREAD", "WINDOW_SHARE", "Refined", "Usual", "refined", "sought_again"]
 
 # Half the window of cornerSubPix is this share of a square.
 NEAR_SHARE = 0.25
@@ -68,6 +68,24 @@ CLEAR_BLURS = 2.0
 LEAST_SADDLE_SHARE = 0.85
 
 
+class Usual(NamedTuple):
+    """What is usual among the corners of a picture, so that some of them can be sought again by themselves.
+
+    Attributes:
+        shrink: how many of the photograph's pixels are one of the picture that was fitted.
+        noise: variance of that picture's noise.
+        blur: of the saddles, its pixels.
+        contrast: of the saddles, grey levels.
+        left: share of a window's variance that is neither saddle nor noise.
+    """
+
+    shrink: int
+    noise: float
+    blur: float
+    contrast: float
+    left: float
+
+
 class Refined(NamedTuple):
     """Corners, (m,) of each.
 
@@ -79,6 +97,8 @@ class Refined(NamedTuple):
         whole: whether all its arms agree about it; where something covers a part of a window, they do not.
         spread: its standard deviation in its worst direction, pixels, by what its saddle leaves.
         plain: whether its window holds hardly anything but the saddle.
+        contrast: grey levels; of one sign where the square towards the next column and row is bright.
+        usual: what is usual among them.
     """
 
     pixels: Float[ndarray, "m 2"]
@@ -88,19 +108,24 @@ class Refined(NamedTuple):
     whole: Bool[ndarray, " m"]
     spread: Float[ndarray, " m"]
     plain: Bool[ndarray, " m"]
+    contrast: Float[ndarray, " m"]
+    usual: Usual
 
     def of(self, which: ndarray) -> Refined:
         """Some of them."""
-        return Refined(*(part[which] for part in self))
+        return Refined(*(part[which] for part in self[:-1]), self.usual)
 
-    def with_others(self, which: Bool[ndarray, " m"], others: Refined) -> Refined:
-        """Some of them replaced by those of `others`."""
-        return Refined(
-            *(
-                np.where(which[:, None] if one.ndim > 1 else which, other, one)
-                for one, other in zip(self, others, strict=True)
-            )
-        )
+    def among(self, ids: Int[ndarray, " m"], count: int) -> Refined:
+        """Them at their numbers among so many, of which the others are nothing yet."""
+        parts = [np.zeros((count, *part.shape[1:]), part.dtype) for part in self[:-1]]
+        return Refined(*parts, self.usual).with_others(ids, self)
+
+    def with_others(self, which: ndarray, others: Refined) -> Refined:
+        """Some of them, by their numbers, replaced."""
+        parts = [part.copy() for part in self[:-1]]
+        for part, new in zip(parts, others, strict=False):
+            part[which] = new
+        return Refined(*parts, self.usual)
 
 
 def refined(
@@ -123,42 +148,104 @@ def refined(
     """
     square = nearest_neighbour(rough, places)
     shrink = max(1, round(median(square) / USUAL_SQUARE))
-    first, part = _surroundings(grey, rough, square.max())
+    every = np.arange(len(rough))
+    return _refined(grey, rough, places, square, every, _Asked(shrink, approach, arm, None))
+
+
+def sought_again(
+    grey: ndarray,
+    fine: Refined,
+    start: Float[ndarray, "m 2"],
+    places: Float[ndarray, "m 2"],
+    which: Bool[ndarray, " m"],
+    *,
+    arm: float | Float[ndarray, " m"] = 1.0,
+) -> Refined:
+    """The corners with some of them refined once more, from where they are foreseen; cornerSubPix went astray
+    there.
+
+    Args:
+        grey: (h,w) uint8.
+        fine: all of them.
+        start: (m,2) pixels, of those that are sought.
+        places, arm: as for `refined`.
+        which: those that are sought.
+    """
+    rough = np.where(which[:, None], start, fine.pixels)
+    square, some = nearest_neighbour(rough, places), np.flatnonzero(which)
+    asked = _Asked(fine.usual.shrink, approach=False, arm=arm, usual=fine.usual)
+    return fine.with_others(some, _refined(grey, rough, places, square, some, asked))
+
+
+class _Asked(NamedTuple):
+    """How corners are refined: see `refined`; and what is usual, where it is known already."""
+
+    shrink: int
+    approach: bool
+    arm: float | ndarray
+    usual: Usual | None
+
+
+def _refined(
+    grey: ndarray,
+    rough: Float[ndarray, "m 2"],
+    places: Float[ndarray, "m 2"],
+    square: Float[ndarray, " m"],
+    some: Int[ndarray, " k"],
+    asked: _Asked,
+) -> Refined:
+    """Those corners whose numbers are in `some`, of all that make the lattice."""
+    shrink, usual = asked.shrink, asked.usual
+    first, part = _surroundings(grey, rough[some], square.max())
     small = _reduced(part, shrink)
     near = (rough - first + 0.5) / shrink - 0.5
     step = square / shrink
-    near = _near(small, near, step) if approach else near
-    shape = grid_shape(near, places)
+    near = _near(small, near, step) if asked.approach else near
+    all_shape = grid_shape(near, places)
+    shape, near, step = all_shape.of(some), near[some], step[some]
+    arm = asked.arm if isinstance(asked.arm, float) else asked.arm[some]
     along, down = _window(shape.along), _window(shape.down)
     bends, arms = np.stack([shape.bend_along, shape.bend_down], axis=1), _arms(shape, arm)
     smooth = cv2.GaussianBlur(small, (0, 0), SMOOTHING_SIGMA)
-    saddles = fit_saddles(smooth, near, along, down, bends=bends, arms=arms)
+    saddles = fit_saddles(
+        smooth, near, along, down, bends=bends, arms=arms, usual_blur=usual.blur if usual else None
+    )
     allowed = np.maximum(FARTHEST_SHARE * step, 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
-    noise = NOISE_LEFT_SHARE * noise_variance(small)
-    noise_share = noise / np.maximum(signal + noise, 1e-9)
+    noise = usual.noise if usual else noise_variance(small)
+    noise_share = NOISE_LEFT_SHARE * noise / np.maximum(signal + NOISE_LEFT_SHARE * noise, 1e-9)
     least = LEAST_SADDLE_SHARE * (1.0 - noise_share)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     sure = believed & (saddles.spread * shrink < WIDEST_SPREAD)
     sure &= _are_clear(saddles, step, arm)
     if not (sure & (_turn(saddles, shape) < WIDEST_TURN)).all():  # what is off was perhaps not near yet
-        shape = grid_shape(saddles.places, places)
+        places_now = (rough - first + 0.5) / shrink - 0.5
+        places_now[some] = saddles.places
+        shape = grid_shape(places_now, places).of(some)
     left = 1.0 - saddles.explained - noise_share
-    left -= median(left)
+    usual = usual or Usual(
+        shrink, noise, median(saddles.blur), median(np.abs(saddles.contrast)), median(left)
+    )
+    left -= usual.left
     whole = np.ones(len(left), dtype=bool)
     plain = left <= HARDLY_UNEXPLAINED + HARDLY_UNEXPLAINED_NOISE * noise_share
-    asked = np.flatnonzero(~plain)
-    if len(asked):
-        some = Saddles(*(part[asked] for part in saddles))
-        told = saddle_arms(smooth, some, along[asked], down[asked], bends=bends[asked], arms=arms[asked])
+    doubtful = np.flatnonzero(~plain)
+    if len(doubtful):
+        few = Saddles(*(part[doubtful] for part in saddles))
+        told = saddle_arms(
+            smooth, few, along[doubtful], down[doubtful], bends=bends[doubtful], arms=arms[doubtful]
+        )
         most_left = np.where(arms < 1.0, MOST_UNEXPLAINED_BY_MARKS, MOST_UNEXPLAINED)
         little = left < most_left + MOST_UNEXPLAINED_NOISE * noise_share
-        whole[asked] = _have_whole_arms(told, little[asked])
-        unlike = (arms[asked] >= 1.0) & (told.spread < SMALL_ARM_SPREAD).all(1)
-        saddles.places[asked[unlike]] = told.places[unlike]
+        whole[doubtful] = _have_whole_arms(told, little[doubtful])
+        unlike = (arms[doubtful] >= 1.0) & (told.spread < SMALL_ARM_SPREAD).all(1)
+        saddles.places[doubtful[unlike]] = told.places[unlike]
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
-    sure &= _are_alike(saddles, shape)
-    return Refined(pixels, believed, saddles.explained, sure, whole, saddles.spread * shrink, plain)
+    sure &= (_turn(saddles, shape) < WIDEST_TURN) & (
+        np.abs(saddles.contrast) > LEAST_CONTRAST_SHARE * usual.contrast
+    )
+    spread = saddles.spread * shrink
+    return Refined(pixels, believed, saddles.explained, sure, whole, spread, plain, saddles.contrast, usual)
 
 
 def _have_whole_arms(told: SaddleArms, little: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:
@@ -167,12 +254,6 @@ def _have_whole_arms(told: SaddleArms, little: Bool[ndarray, " n"]) -> Bool[ndar
     agree = ((shifts < MOST_ARM_SHIFT) & (told.spread < SMALL_ARM_SPREAD)).all(1)
     differ = (shifts > np.maximum(MOST_ARM_SHIFT, MOST_ARM_SPREADS * told.spread)).any(1)
     return (agree | little) & ~differ & (told.steps > LEAST_ARM_STEP_SHARE).all(1)
-
-
-def _are_alike(saddles: Saddles, shape: GridShape) -> Bool[ndarray, " m"]:
-    """Which saddles have edges along the lattice's lines, and about as much contrast as most."""
-    contrast = np.abs(saddles.contrast)
-    return (_turn(saddles, shape) < WIDEST_TURN) & (contrast > LEAST_CONTRAST_SHARE * median(contrast))
 
 
 def _turn(saddles: Saddles, shape: GridShape) -> Float[ndarray, " m"]:

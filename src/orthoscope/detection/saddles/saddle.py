@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orthoscope.detection.memory import Memory
 from orthoscope.detection.saddles.saddle_windows import COLUMN_COUNT, Shapes, Windows
 from orthoscope.geometry.arrays import Float, median, ndarray
 
@@ -54,7 +55,9 @@ DAMPING = np.array([1e-3] * 5 + [1e-6] * 2 + [0.03] * 2)
 # strong, more than that is taken for noise.
 USUAL_LIGHT = 0.02
 # So many pixels of all windows are done together, so that the arrays stay in cache.
-PIXELS_AT_ONCE = 60_000
+PIXELS_AT_ONCE = 80_000
+# Of the windows of one batch, whose next begins when it is done.
+MEMORY = Memory()
 
 
 class Saddles(NamedTuple):
@@ -85,6 +88,7 @@ def fit_saddles(
     *,
     bends: Float[ndarray, "n 2"],
     arms: Float[ndarray, " n"] | None = None,
+    usual_blur: float | None = None,
 ) -> Saddles:
     """The saddles near `start`.
 
@@ -96,13 +100,19 @@ def fit_saddles(
         bends: curvature of the two edges, 1/px.
         arms: (n,) how far from the edges, as a share of the window, its corners are left out, where something
             else is printed.
+        usual_blur: of the picture's saddles, where it is known; a few of these tell it otherwise.
     """
     fit = _Fit(grey, start, along, down, bends, np.ones(len(start)) if arms is None else arms)
-    fit.begin_with_one_blur()
+    if usual_blur is None:
+        fit.begin_with_one_blur()
+    else:
+        fit.shapes.blur[:] = usual_blur
     for share, still in STAGES:
         fit.settle(fit.by_size, share, still)
     shapes = fit.shapes
-    return Saddles(shapes.places, shapes.angles, shapes.blur, fit.contrast, fit.explained, fit.spread())
+    return Saddles(
+        shapes.places, shapes.angles, shapes.blur, fit.contrast, fit.explained, fit.spread(usual_blur)
+    )
 
 
 class _Fit:
@@ -143,6 +153,7 @@ class _Fit:
                 shares[some] * self.along[some],
                 shares[some] * self.down[some],
                 self.arms[some] / shares[some, 0],
+                MEMORY,
             )
             rows = np.arange(len(some))
             for _ in range(STAGE_STEPS):
@@ -180,13 +191,14 @@ class _Fit:
         damping[:, 7:] += (self.noise[here] / np.maximum(light**2, 1e-9))[:, None]
         return damping
 
-    def spread(self) -> Float[ndarray, " n"]:
+    def spread(self, usual_blur: float | None) -> Float[ndarray, " n"]:
         """The standard deviation of each corner in its worst direction, pixels, from the last step's sums."""
         every = np.arange(len(self.contrast))
         damped = self.sums[:, :-1, :-1] + np.eye(COLUMN_COUNT) * self._damping(every, self.sums)[:, None]
         scale = self.noise / np.maximum(self.contrast**2, 1e-9)
         of_columns = np.linalg.solve(damped, np.eye(COLUMN_COUNT)[:, :2])[:, :2] * scale[:, None, None]
-        blur, bends = np.maximum(self.shapes.blur, median(self.shapes.blur)), self.shapes.bends
+        least = median(self.shapes.blur) if usual_blur is None else usual_blur
+        blur, bends = np.maximum(self.shapes.blur, least), self.shapes.bends
         shapes = Shapes(self.shapes.places, self.shapes.angles, blur, bends, self.shapes.relief)
         units = np.broadcast_to(np.eye(5)[:2], (len(blur), 2, 5))
         turned = np.stack([in_pixels(units[:, i], shapes)[:, :2] for i in (0, 1)], axis=2)

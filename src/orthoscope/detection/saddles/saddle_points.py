@@ -19,12 +19,16 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from orthoscope.detection.memory import Memory
 from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["SaddlePoints", "saddle_points"]
 
 # The picture is blurred with this sigma, pixels, before derivatives.
 BLUR_SIGMA = 1.5
+KERNEL = cv2.getGaussianKernel(13, BLUR_SIGMA, cv2.CV_32F)
+# Of one picture at a time.
+MEMORY = Memory()
 # The circle about a saddle has this radius, pixels.
 CIRCLE_RADIUS = 5.0
 # So many places on the circle are looked at.
@@ -35,6 +39,12 @@ LEAST_EVENNESS = 0.5
 LEAST_STRENGTH_SHARE = 0.02
 # The rms along the circle is more than so many grey levels.
 LEAST_CONTRAST = 2.5
+# So few places on the circle rule most saddles out.
+FEW_SAMPLES = 8
+# Opposite ones of the few correlate by more than this.
+LEAST_EVENNESS_OF_FEW = 0.2
+# The mean square along the few is more than this share of what it is along the circle.
+LEAST_CONTRAST_SHARE_OF_FEW = 0.3
 # So many saddles are looked at, the strongest first.
 MOST_SADDLES = 2500
 
@@ -54,43 +64,66 @@ class SaddlePoints(NamedTuple):
 
 def saddle_points(grey: ndarray) -> SaddlePoints:
     """The corners of four squares in a picture (h,w) uint8."""
-    smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), BLUR_SIGMA)
+    smooth = cv2.sepFilter2D(grey, cv2.CV_32F, KERNEL, KERNEL, dst=MEMORY.of("smooth", grey.shape))
     strength = _strength(smooth)
     x, y = _peaks(strength)
     pixels = np.stack([x, y], axis=1).astype(np.float32)
     pixels += _to_peak(strength, x, y)
-    angles = 2 * np.pi * np.arange(CIRCLE_SAMPLES) / CIRCLE_SAMPLES
-    circle = (CIRCLE_RADIUS * np.stack([np.cos(angles), np.sin(angles)])).astype(np.float32)
-    at = pixels[:, :, None] + circle
-    if not len(at):
+    if len(pixels):
+        pixels = pixels[_may_be_corners(smooth, pixels)]
+    if not len(pixels):
         return SaddlePoints(np.zeros((0, 2)), np.zeros((0, 2)))
-    values = cv2.remap(smooth, at[:, 0].copy(), at[:, 1].copy(), cv2.INTER_LINEAR)
-    values = values - values.mean(1, keepdims=True)
-    power = np.maximum((values**2).sum(1), 1e-9)
-    even = (values * np.roll(values, CIRCLE_SAMPLES // 2, axis=1)).sum(1) / power
+    values, even, power = _around(smooth, pixels, CIRCLE_SAMPLES)
     sign = values > 0
     changes = sign != np.roll(sign, -1, axis=1)
-    good = (changes.sum(1) == 4) & (even > LEAST_EVENNESS) & (power > CIRCLE_SAMPLES * LEAST_CONTRAST**2)
+    good = (changes.sum(1) == 4) & (even > LEAST_EVENNESS) & (power > LEAST_CONTRAST**2)
     return SaddlePoints(pixels[good].astype(float), _edges(values[good], changes[good]))
+
+
+def _may_be_corners(smooth: ndarray, pixels: ndarray) -> ndarray:
+    """Which places a look at a few samples of their circles does not rule out: most saddles are noise's."""
+    _, even, power = _around(smooth, pixels, FEW_SAMPLES)
+    return (even > LEAST_EVENNESS_OF_FEW) & (power > LEAST_CONTRAST_SHARE_OF_FEW * LEAST_CONTRAST**2)
+
+
+def _around(smooth: ndarray, pixels: ndarray, samples: int) -> tuple[ndarray, ndarray, ndarray]:
+    """Along the circles: grey without its mean, how alike opposite sides are, and the mean square."""
+    angles = 2 * np.pi * np.arange(samples) / samples
+    circle = (CIRCLE_RADIUS * np.stack([np.cos(angles), np.sin(angles)])).astype(np.float32)
+    x, y = pixels.T[:, :, None] + circle[:, None]
+    values = cv2.remap(smooth, x, y, cv2.INTER_LINEAR)
+    values -= values.mean(1, keepdims=True)
+    square = np.maximum(np.einsum("nk,nk->n", values, values), 1e-9)
+    half = samples // 2
+    even = 2.0 * np.einsum("nk,nk->n", values[:, :half], values[:, half:]) / square
+    return values, even, square / samples
 
 
 def _strength(smooth: ndarray) -> ndarray:
     """Minus the determinant of the second derivatives, 0 where it is none of a saddle."""
-    across = cv2.Sobel(smooth, cv2.CV_32F, 2, 0, ksize=3)
-    upright = cv2.Sobel(smooth, cv2.CV_32F, 0, 2, ksize=3)
-    mixed = cv2.Sobel(smooth, cv2.CV_32F, 1, 1, ksize=3)
-    return np.maximum(4.0 * mixed * mixed - across * upright, 0.0)
+    across, upright, mixed = (
+        cv2.Sobel(smooth, cv2.CV_32F, *orders, ksize=3, dst=MEMORY.of(str(orders), smooth.shape))
+        for orders in ((2, 0), (0, 2), (1, 1))
+    )
+    cv2.multiply(across, upright, dst=across)
+    cv2.multiply(mixed, mixed, dst=mixed, scale=4.0)
+    cv2.subtract(mixed, across, dst=mixed)
+    return cv2.max(mixed, 0.0, dst=mixed)
 
 
 def _peaks(strength: ndarray) -> tuple[ndarray, ndarray]:
     """Columns and rows of the strongest places among their neighbours."""
     reach = int(np.ceil(CIRCLE_RADIUS)) + 1
-    peak = (strength >= cv2.dilate(strength, np.ones((7, 7), np.uint8))) & (
-        strength > LEAST_STRENGTH_SHARE**2 * strength.max(initial=0.0)
-    )
-    peak[:reach] = peak[-reach:] = False
-    peak[:, :reach] = peak[:, -reach:] = False
-    y, x = np.nonzero(peak)
+    if min(strength.shape) <= 2 * reach:
+        return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
+    least = LEAST_STRENGTH_SHARE**2 * float(strength.max())
+    largest = cv2.dilate(strength, np.ones((7, 7), np.uint8), dst=MEMORY.of("largest", strength.shape))
+    peak = np.greater_equal(strength, largest, out=MEMORY.of("peak", strength.shape, bool))
+    peak &= np.greater(strength, least, out=MEMORY.of("strong", strength.shape, bool))
+    y, x = np.divmod(np.flatnonzero(peak), strength.shape[1])
+    height, width = strength.shape
+    inside = (x >= reach) & (x < width - reach) & (y >= reach) & (y < height - reach)
+    x, y = x[inside], y[inside]
     if len(y) > MOST_SADDLES:
         first = np.argpartition(-strength[y, x], MOST_SADDLES)[:MOST_SADDLES]
         y, x = y[first], x[first]
@@ -111,12 +144,9 @@ def _edges(values: ndarray, changes: ndarray) -> Float[ndarray, "n 2"]:
     """The angles at which the circle goes from dark to bright and from bright to dark, opposite ones
     averaged.
     """
-    following = np.roll(values, -1, axis=1)
-    share = values / np.where(changes, values - following, 1.0)
-    angle = 2 * np.pi * (np.arange(CIRCLE_SAMPLES) + share) / CIRCLE_SAMPLES
-    rising = changes & (following > 0)
-    edges = []
-    for which in (rising, changes & ~rising):
-        turns = np.where(which, np.exp(2j * angle), 0.0).sum(1)  # opposite angles have the same double
-        edges.append(0.5 * np.angle(turns) % np.pi)
-    return np.stack(edges, axis=1)
+    corner, sample = np.nonzero(changes)  # four for each corner, up and down by turns
+    here, following = values[corner, sample], values[corner, (sample + 1) % CIRCLE_SAMPLES]
+    angle = 2 * np.pi * (sample + here / (here - following)) / CIRCLE_SAMPLES
+    turns = np.exp(2j * angle).reshape(-1, 2, 2).sum(1)  # opposite angles have the same double
+    rises_first = (following > 0)[::4, None]
+    return 0.5 * np.angle(np.where(rises_first, turns, turns[:, ::-1])) % np.pi

@@ -115,7 +115,11 @@ def smooth_fit(
         return None, np.zeros(len(pixels))
     flat = cv2.perspectiveTransform(places[None].astype(float), homography)[0]
     basis = np.linalg.qr(terms[used])[0]
-    coefficients = np.linalg.lstsq(terms[used], (pixels - flat)[used], rcond=None)[0]
+    rest = (pixels - flat)[used]
+    fitted = flat.copy()
+    fitted[used] += basis @ (basis.T @ rest)
+    if not used.all():
+        fitted[~used] += terms[~used] @ np.linalg.lstsq(terms[used], rest, rcond=None)[0]
     weight = np.zeros(len(pixels))
     weight[used] = np.minimum((basis**2).sum(1), 0.9)
-    return flat + terms @ coefficients, weight
+    return fitted, weight
