@@ -81,7 +81,7 @@ def _neighbours(points: SaddlePoints) -> Int[ndarray, "n 4"]:
     np.fill_diagonal(apart, np.inf)
     rows, others = np.nonzero(apart <= np.partition(apart, few - 1, axis=1)[:, few - 1 : few])
     turns = np.exp(2j * points.edges)  # the same for both directions along an edge
-    alike = (turns[others, ::-1] * turns[rows].conj()).real.min(1) > np.cos(2.0 * WIDEST_TURN)
+    alike = np.real(turns[others, ::-1] * turns[rows].conj()).min(1) > np.cos(2.0 * WIDEST_TURN)
     rows, others = rows[alike], others[alike]
     step = pixels[others] - pixels[rows]
     heading, far = np.arctan2(step[:, 1], step[:, 0]), np.hypot(step[:, 0], step[:, 1])

@@ -94,7 +94,7 @@ def _beside_lost(
         return np.zeros(len(pixels), dtype=bool)
     row, column = np.mgrid[:rows, :columns].astype(float)
     there = cv2.perspectiveTransform(np.stack([column, row], axis=-1), homography)
-    lost = ((there >= RIM_PX) & (there <= np.array(image_size) - 1 - RIM_PX)).all(-1)
+    lost = np.all((there >= RIM_PX) & (there <= np.array(image_size) - 1 - RIM_PX), axis=-1)
     lost[cells[:, 1], cells[:, 0]] = False
     near = cv2.dilate(lost.astype(np.uint8), np.ones((3, 3), np.uint8))
     return near[cells[:, 1], cells[:, 0]].astype(bool)

@@ -113,19 +113,19 @@ class Refined(NamedTuple):
 
     def of(self, which: ndarray) -> Refined:
         """Some of them."""
-        return Refined(*(part[which] for part in self[:-1]), self.usual)
+        return Refined._make([*(part[which] for part in self[:-1]), self.usual])
 
     def among(self, ids: Int[ndarray, " m"], count: int) -> Refined:
         """Them at their numbers among so many, of which the others are nothing yet."""
         parts = [np.zeros((count, *part.shape[1:]), part.dtype) for part in self[:-1]]
-        return Refined(*parts, self.usual).with_others(ids, self)
+        return Refined._make([*parts, self.usual]).with_others(ids, self)
 
     def with_others(self, which: ndarray, others: Refined) -> Refined:
         """Some of them, by their numbers, replaced."""
         parts = [part.copy() for part in self[:-1]]
         for part, new in zip(parts, others, strict=False):
             part[which] = new
-        return Refined(*parts, self.usual)
+        return Refined._make([*parts, self.usual])
 
 
 def refined(
@@ -203,7 +203,7 @@ def _refined(
     near = _near(small, near, step) if asked.approach else near
     all_shape = grid_shape(near, places)
     shape, near, step = all_shape.of(some), near[some], step[some]
-    arm = asked.arm if isinstance(asked.arm, float) else asked.arm[some]
+    arm = asked.arm[some] if isinstance(asked.arm, ndarray) else asked.arm
     along, down = _window(shape.along), _window(shape.down)
     bends, arms = np.stack([shape.bend_along, shape.bend_down], axis=1), _arms(shape, arm)
     smooth = cv2.GaussianBlur(small, (0, 0), SMOOTHING_SIGMA)

@@ -108,7 +108,7 @@ def _strength(smooth: ndarray) -> ndarray:
     cv2.multiply(across, upright, dst=across)
     cv2.multiply(mixed, mixed, dst=mixed, scale=4.0)
     cv2.subtract(mixed, across, dst=mixed)
-    return cv2.max(mixed, 0.0, dst=mixed)
+    return np.maximum(mixed, 0.0, out=mixed)
 
 
 def _peaks(strength: ndarray) -> tuple[ndarray, ndarray]:
