@@ -18,7 +18,7 @@ from orthoscope.targets.aprilgrid import BORDER_SQUARES, DICTIONARY, TAG_SQUARES
 
 __all__ = ["see_aprilgrid"]
 
-# Where this share of the board's tags is found no other copy is looked at.
+# Where this share of the board's tags is found no other copy is looked at; any, where it is seen already.
 ENOUGH_TAGS_SHARE = 0.9
 # A sight of the grid has at least this many corners.
 FEWEST_CORNERS = 4
@@ -44,7 +44,8 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
     if seen and seen.is_complete and (sight := sight_of(seen, corners, grey.shape, twice)):
         return sight
     count = board.columns * board.rows
-    found = find_markers(grey, DICTIONARY, int(ENOUGH_TAGS_SHARE * count), border=BORDER_SQUARES)
+    enough = 1 if seen else int(ENOUGH_TAGS_SHARE * count)
+    found = find_markers(grey, DICTIONARY, enough, border=BORDER_SQUARES)
     numbers = found.numbers - board.first
     known = (numbers >= 0) & (numbers < count)
     markers = Markers(numbers[known], found.corners[known])

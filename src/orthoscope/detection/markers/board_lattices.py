@@ -14,7 +14,7 @@ from orthoscope.detection.chessboards.lattices import LONGEST_STEP, CornerLattic
 from orthoscope.detection.saddles.saddle_points import saddle_points
 from orthoscope.detection.sight import TWICE
 from orthoscope.detection.small_copies import enlarged, resized, to_photograph
-from orthoscope.geometry.arrays import Float, ndarray
+from orthoscope.geometry.arrays import Float, median, ndarray
 
 __all__ = ["board_corners"]
 
@@ -31,6 +31,8 @@ LATTICES_PER_COPY = 2
 FEWEST_CORNERS = 6
 # And at least this share of those of the largest.
 SECOND_SHARE = 0.2
+# Where corners are farther apart than this, pixels of a copy, a larger one shows no more of them.
+LARGE_STEP_PX = 20.0
 # Where this share of the board's corners is in a lattice no further copy is looked at.
 ENOUGH_CORNERS_SHARE = 0.5
 
@@ -66,6 +68,8 @@ def board_corners(
             best, remark = _together(found)
         if best is not None and _seen_count(best) >= ENOUGH_CORNERS_SHARE * len(best):
             break
+        if found and _usual_step(hanging[0]) > LARGE_STEP_PX:
+            break
     return best, remark
 
 
@@ -78,6 +82,13 @@ def _together(found: list[Float[ndarray, "m 2"]]) -> tuple[Float[ndarray, "m 2"]
         else:
             best = np.where(np.isfinite(best), best, other)
     return best, remark
+
+
+def _usual_step(lattice: CornerLattice) -> float:
+    """The distance to the nearest corner, of most, pixels of its copy."""
+    apart = np.linalg.norm(lattice.pixels[:, None] - lattice.pixels, axis=-1)
+    np.fill_diagonal(apart, np.inf)
+    return median(apart.min(1))
 
 
 def _seen_count(corners: Float[ndarray, "m 2"]) -> int:

@@ -21,7 +21,7 @@ from orthoscope.targets.charuco import Charuco
 
 __all__ = ["see_charuco"]
 
-# Where this share of the board's markers is found no other copy is looked at.
+# Where this share of the board's markers is found no other copy is looked at; any, where it is seen already.
 ENOUGH_MARKERS_SHARE = 0.9
 # These are a square's corners about its middle.
 SQUARE_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -39,7 +39,7 @@ def see_charuco(grey: ndarray, board: Charuco) -> Sight | Unseen:
     seen = None if together is None else grown_from(grey, together, corners)
     if seen and seen.is_complete and (sight := sight_of(seen, corners, grey.shape, twice)):
         return sight
-    enough = int(ENOUGH_MARKERS_SHARE * len(board.marker_squares()))
+    enough = 1 if seen else int(ENOUGH_MARKERS_SHARE * len(board.marker_squares()))
     markers, legacy, remark = _in_layout(find_markers(grey, board.dictionary, enough), board)
     if not seen and not len(markers.numbers):
         return Unseen(f"was not found in it: none of the markers of {board.dictionary} was")
