@@ -9,6 +9,7 @@ import pytest
 from orthoscope.detection.detect import detect
 from orthoscope.detection.discs.circles import see_circles
 from orthoscope.detection.discs.disc_fit import fit_discs
+from orthoscope.detection.discs.disc_lattice import laid_on
 from orthoscope.detection.discs.disc_outlines import fitted_whole, outlines_near, smoothed
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.fitting.disc_centres import disc_offsets
@@ -184,3 +185,17 @@ def test_discs_that_are_all_ragged_are_whole():
     )
     # an outline has some seven parts that differ: a centre moves by 0.2 px times the root of 2 over 7
     assert rms_off(see_circles(ragged, board), truth) < 1.5 * 0.2 * np.sqrt(2.0 * 2.0 / 7.0)
+
+
+def test_a_lattice_whose_lines_turn_halfway_is_not_laid():
+    """Of a slanted board's small discs a diagonal one may be taken for the next in a part of it."""
+    board = Circles(9, 7, 0.02, "symmetric", 0.01)
+    places = board.neighbour_places()
+    discs = Ellipses(40.0 * places + [60.0, 60.0], np.tile(8.0 * np.eye(2), (len(places), 1, 1)))
+    seen = (places[:, 0] > 0) & (places[:, 0] < 8) | (places[:, 1] <= 3)
+    turned = places.copy()
+    turned[:, 0] -= np.maximum(places[:, 1] - 3, 0)
+    for given, laid in ((places, True), (turned, False)):
+        ids, _ = laid_on(board, discs.of(seen), given[seen], (480, 640))
+        assert (ids >= 0).all() == laid
+        assert (ids >= 0).any() == laid

@@ -110,7 +110,8 @@ def fit_discs(grey: ndarray, rough: Ellipses) -> FittedDiscs:
     outlines = Ellipses(centres, fit.axes * shrink)
     lengths = fit.off, fit.off_spread, fit.blur, fit.centre_spread
     rest = np.sqrt(fit.noise) / np.abs(fit.step)
-    return FittedDiscs(outlines, *(length * shrink for length in lengths), rest)
+    off, spread, blur, centre_spread = (length * shrink for length in lengths)
+    return FittedDiscs(outlines, off, spread, blur, centre_spread, rest)
 
 
 def _surroundings(grey: ndarray, discs: Ellipses) -> tuple[Int[ndarray, " 2"], ndarray]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from orthoscope.detection.discs.disc_foresight import beside, foreseen, is_among
-from orthoscope.geometry.arrays import Int, ndarray
+from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.geometry.ellipses import Ellipses
 from orthoscope.targets.circles import Circles
 
@@ -21,6 +21,9 @@ __all__ = ["laid_on"]
 STRAIGHTENED = (((1, 0), (1, 1)), ((1, 0), (-1, 1)), ((1, 1), (0, 1)), ((1, -1), (0, 1)))
 # So they are only where this share of the board's discs hangs together; fewer could lie on it by chance.
 LEAST_SLANTED_SHARE = 0.8
+# From one step of a lattice to the next its line turns by less than this share of both; at most so many
+# discs, or this share of them, are an exception.
+MOST_TURN, MOST_TURNS, MOST_TURNS_SHARE = 0.3, 1, 0.04
 # A board is laid with at least so many discs.
 FEWEST_LAID = 4
 # Of the discs that ought to be seen at most this share, of those found, is missing.
@@ -44,6 +47,8 @@ def laid_on(
         places: of them in the lattice, as `numbered` says.
         shape: of the picture.
     """
+    if _is_kinked(discs.centres, places):
+        return np.full(len(places), -1), False
     ids, several = _laid_straight(board, discs, places, shape)
     if (ids >= 0).any() or len(places) < LEAST_SLANTED_SHARE * board.columns * board.rows:
         return ids, several
@@ -52,6 +57,24 @@ def laid_on(
         if (slanted >= 0).any():
             return slanted, False
     return ids, several
+
+
+def _is_kinked(centres: Float[ndarray, "n 2"], places: Int[ndarray, "n 2"]) -> bool:
+    """Whether lines of the lattice turn from one step to the next: in a part of it discs that stand
+    diagonally were taken for the next.
+    """
+    number = {place: i for i, place in enumerate(map(tuple, places.tolist()))}
+    before, here, after = (
+        np.array([number.get((x + k * dx, y + k * dy), -1) for x, y in number for dx, dy in ((1, 0), (0, 1))])
+        for k in (-1, 0, 1)
+    )
+    known = (before >= 0) & (after >= 0)
+    if not known.any():
+        return False
+    ahead, back = centres[after[known]], centres[before[known]]
+    turn = np.linalg.norm(ahead + back - 2.0 * centres[here[known]], axis=1)
+    turned = turn > MOST_TURN * np.linalg.norm(ahead - back, axis=1)
+    return int(turned.sum()) > max(MOST_TURNS, MOST_TURNS_SHARE * len(turned))
 
 
 def _laid_straight(
