@@ -58,3 +58,12 @@ def test_lines_that_leap_by_a_knight_s_move_are_parted():
     assert isinstance(sight, Sight)
     assert len(sight.ids) >= 30
     assert errors_of(shown, sight).max() < 0.2
+
+
+def test_marks_that_blur_hides_do_not_turn_a_board_into_its_negative():
+    """Discs of two pixels counted as missing, and the negative, whose discs were outside, was taken."""
+    (shown,) = photographs(1, seed=14, first=1155)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) >= 60
+    assert errors_of(shown, sight).max() < 0.5

@@ -13,15 +13,21 @@ import numpy as np
 
 from orthoscope.detection.chessboards.partial_board import Grid
 from orthoscope.detection.markers.markers import find_markers
-from orthoscope.geometry.arrays import Float, Int, ndarray
+from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 from orthoscope.targets.marked_chessboard import DISC_RADIUS, MarkedChessboard
 
 __all__ = ["ways_by_marks"]
 
-# A disc is there where the middle differs from its surroundings by more of the board's contrast than this.
+# A disc is there where the middle differs from its surroundings, beyond that of most squares, by more of the
+# board's contrast than this.
 DISC_IS_THERE = 0.35
 # And is not there where it differs by less than this share.
 NO_DISC = 0.15
+# A disc that is there differs by more than so many times what squares without one do.
+TIMES_USUAL = 8.0
+# Blur makes a square's middle differ from its surroundings the other way, and leaves less of a disc: both
+# shares fall by so many times that, to no less than this share of them.
+LOST_BY_BLUR, LEAST_LEFT = 5.0, 0.3
 # A marker's corner is at most so many of its sides from where a way has it.
 FARTHEST_CORNER = 0.25
 # Where a square's middle and its surroundings are looked at, in squares from its centre.
@@ -29,7 +35,12 @@ MIDDLE, AROUND = 0.5 * DISC_RADIUS, 1.6 * DISC_RADIUS
 
 
 def ways_by_marks(
-    grey: ndarray, grid: Grid, ways: list[Int[ndarray, "r c"]], board: MarkedChessboard
+    grey: ndarray,
+    grid: Grid,
+    ways: list[Int[ndarray, "r c"]],
+    board: MarkedChessboard,
+    *,
+    only_seen: bool = False,
 ) -> list[Int[ndarray, "r c"]]:
     """Of the ways to lay a grid on a board those that its marks allow.
 
@@ -38,13 +49,14 @@ def ways_by_marks(
         grid: the lattice, in the picture's pixels.
         ways: ids of the grid's corners for each way.
         board: what it is laid on.
+        only_seen: whether ways that have no mark in the picture are out, too.
     """
     if not ways or min(grid.seen.shape) < 2:
-        return ways
+        return [] if only_seen else ways
     marks = (_by_marker if board.dictionary else _by_discs)(grey, grid, ways, board)
     if not any(hits for hits, _ in marks):
         # no mark is seen where it ought to be: a way that has none in the picture is not right for that
-        return [] if any(misses for _, misses in marks) else ways
+        return [] if only_seen or any(misses for _, misses in marks) else ways
     return [way for way, (hits, misses) in zip(ways, marks, strict=True) if hits and not misses]
 
 
@@ -52,17 +64,26 @@ def _by_discs(
     grey: ndarray, grid: Grid, ways: list[ndarray], board: MarkedChessboard
 ) -> list[tuple[int, int]]:
     """How many discs of each way are seen, and how many are missing or stand where it has none."""
-    strength = _disc_strengths(grey, grid)
-    there, absent = strength > DISC_IS_THERE, strength < NO_DISC
+    there, absent = _there_and_absent(_disc_strengths(grey, grid))
     found = []
     for way in ways:
-        marked = np.zeros(strength.shape, dtype=bool)
+        marked = np.zeros(there.shape, dtype=bool)
         for square in board.discs:
             cell = _cell_of(way, board.corners_of(square))
             if cell is not None:
                 marked[cell] = True
         found.append((int((marked & there).sum()), int((marked & absent).sum() + (~marked & there).sum())))
     return found
+
+
+def _there_and_absent(strength: Float[ndarray, "a b"]) -> tuple[Bool[ndarray, "a b"], Bool[ndarray, "a b"]]:
+    """In which squares a disc is surely seen, and in which there is surely none."""
+    seen = strength[np.isfinite(strength)]
+    usual = median(seen) if len(seen) else 0.0
+    left = np.clip(1.0 + LOST_BY_BLUR * usual, LEAST_LEFT, 1.0)
+    differs = median(np.abs(seen - usual)) if len(seen) else 0.0
+    more = strength - usual
+    return more > max(DISC_IS_THERE * left, TIMES_USUAL * differs), more < NO_DISC * left
 
 
 def _disc_strengths(grey: ndarray, grid: Grid) -> Float[ndarray, "a b"]:

@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from orthoscope.detection.chessboards.board_marks import ways_by_marks
-from orthoscope.detection.chessboards.grid import cross
+from orthoscope.detection.chessboards.grid import cross, nearest_neighbour
 from orthoscope.detection.chessboards.lattices import CornerLattice, lattices
 from orthoscope.detection.chessboards.opencv_finders import opencv_boards
 from orthoscope.detection.chessboards.partial_board import (
@@ -37,8 +37,8 @@ from orthoscope.detection.saddles.contradicted import are_contradicted
 from orthoscope.detection.saddles.linked import are_linked
 from orthoscope.detection.saddles.saddle_points import saddle_points
 from orthoscope.detection.sight import TWICE, Sight, Unseen
-from orthoscope.detection.small_copies import resized, to_photograph
-from orthoscope.geometry.arrays import Bool, Float, InputError, Int, ndarray
+from orthoscope.detection.small_copies import enlarged, resized, to_photograph
+from orthoscope.geometry.arrays import Bool, Float, InputError, Int, median, ndarray
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.marked_chessboard import MarkedChessboard
 
@@ -46,6 +46,9 @@ __all__ = ["board_size", "find_chessboard", "see_chessboard"]
 
 # Copies have these longer sides, pixels; most boards are found in the first.
 COPY_SIDES = (640, 320, 1280, 2560)
+# Where so many corners, closer than so many pixels, hang together and make no whole board, a copy twice as
+# large is looked at.
+PROMISING_CORNERS, SMALL_SQUARE = 8, 20.0
 # So many lattices of each copy are looked at, since a chequered shirt may be larger than the board.
 LATTICES_PER_COPY = 2
 # A part of a board has at least this many corners.
@@ -203,15 +206,33 @@ def lattice_sizes(grey: ndarray) -> set[tuple[int, int]]:
 
 
 def _hanging_together(grey: ndarray) -> Iterator[tuple[CornerLattice, ndarray, list[CornerLattice]]]:
-    """The largest lattices of each copy, the copy, and the lattices of it that are smaller."""
-    shapes = set()
+    """The largest lattices of each copy, the copy, and the lattices of it that are smaller; at last of an
+    enlarged one, where squares are small.
+    """
+    shapes, are_small = set(), False
     for side in COPY_SIDES:
         copy = resized(grey, side)
         if copy.shape not in shapes:
             shapes.add(copy.shape)
-            found = lattices(saddle_points(copy))[:LATTICES_PER_COPY]
-            for number, one in enumerate(found, 1):
-                yield one, copy, found[number:]
+            found = _largest(copy)
+            are_small |= bool(found) and copy is grey and _has_small_squares(found[0])
+            yield from ((one, copy, found[number:]) for number, one in enumerate(found, 1))
+    if are_small:
+        found = _largest(copy := enlarged(grey))
+        yield from ((one, copy, found[number:]) for number, one in enumerate(found, 1))
+
+
+def _largest(copy: ndarray) -> list[CornerLattice]:
+    return lattices(saddle_points(copy))[:LATTICES_PER_COPY]
+
+
+def _has_small_squares(found: CornerLattice) -> bool:
+    """Whether many corners hang together, but so close that the circles around them reach into other
+    squares.
+    """
+    if len(found.pixels) < PROMISING_CORNERS:
+        return False
+    return median(nearest_neighbour(found.pixels, found.cells.astype(float))) < SMALL_SQUARE
 
 
 def _on_board(
@@ -225,7 +246,9 @@ def _on_board(
     arms = np.ones(grid.seen.shape)
     if isinstance(board, MarkedChessboard):
         negative = placements(grid, board.columns, board.rows, negative=True)
-        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(grey, grid, negative, board)
+        ways = ways_by_marks(grey, grid, ways, board) or ways_by_marks(
+            grey, grid, negative, board, only_seen=True
+        )
     if not ways or not _alike(ways, grid.seen, board.symmetries()):
         return None
     whole = grid.seen.size == board.columns * board.rows

@@ -26,7 +26,7 @@ MEDIAN_LENGTH = 1.18
 # by less than so many.
 MOST_OF_NOISE = (4.0, 5.0)
 # The same where lens and board make them.
-MOST_OF_SHAPE = (7.0, 15.0)
+MOST_OF_SHAPE = (5.0, 15.0)
 # A picture is noisy where residuals are less than so many of the spreads that the corners' windows tell.
 NOISY_SPREADS = 2.0
 # A doubtful corner, and any other, that is off by less than this, pixels, stays.
