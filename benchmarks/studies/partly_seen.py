@@ -26,6 +26,7 @@ from orthoscope.geometry.pose import Pose, rotation_from_vector
 from orthoscope.models.camera import Camera
 from orthoscope.simulation.render import Renderer
 from orthoscope.targets.aprilgrid import AprilGrid
+from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
@@ -58,7 +59,7 @@ def photographs(spec: str, part: str, count: int) -> Iterator[Part]:
         picture = renderer.photograph(target, pose, rng=rng)
         truth = renderer.camera.project(pose.apply(target.points))
         step = _step(target, truth)
-        whole = ((truth > step[:, None]) & (truth < np.array(SIZE) - 1.0 - step[:, None])).all(1)
+        whole = np.asarray(((truth > step[:, None]) & (truth < np.array(SIZE) - 1.0 - step[:, None])).all(1))
         if part == PARTS[1]:
             hidden = _hidden(picture, renderer.camera, target, pose, rng)
             near = np.rint(np.clip(truth, 0, np.array(SIZE) - 1)).astype(int).T
@@ -107,6 +108,7 @@ def _hidden(
         outlines = board.points()[board.tag_corners()]
         outlines = outlines.mean(1, keepdims=True) + 0.9 * (outlines - outlines.mean(1, keepdims=True))
     else:
+        assert isinstance(board, Charuco)
         flat = board.marker_corners() * board.square
         outlines = np.concatenate([flat, np.zeros_like(flat[..., :1])], axis=-1)
     covered = rng.permutation(len(outlines))[: round(HIDDEN_SHARE * len(outlines))]

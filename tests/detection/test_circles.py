@@ -152,3 +152,35 @@ def test_what_covers_a_disc_moves_a_sector_of_its_outline():
     fit = fit_discs(grey, Ellipses(centres, np.tile(11.0 * np.eye(2), (len(centres), 1, 1))))
     moved = (np.abs(fit.off) > 4.5 * fit.spread + 0.02).any(1)
     assert np.flatnonzero(moved).tolist() == [14]
+
+
+@pytest.mark.parametrize("white", [False, True], ids=["black", "white"])
+def test_a_shadow_over_half_of_a_board_leaves_no_disc_beside_its_edge_out(white):
+    board = Circles(9, 7, 0.02, "symmetric", 0.01)
+    picture, truth = photographed(board, (0.2, 0.3, 0.0), 0.3)
+    shade = 0.35 + 0.65 / (1.0 + np.exp((np.arange(640) - 330.0) / 8.0))
+    shaded = np.rint((255.0 - picture if white else picture) * shade).astype(np.uint8)
+    sight = see_circles(shaded, board)
+    assert isinstance(sight, Sight)
+    beside = np.flatnonzero(np.abs(truth[:, 0] - 330.0) > 45.0)
+    assert np.isin(beside, sight.ids).all()
+    assert np.linalg.norm(sight.pixels - truth[sight.ids], axis=1).max() < 0.3
+
+
+def test_discs_that_are_all_ragged_are_whole():
+    """As a rough print or a sharpened picture has them: a fifth of a pixel to and fro along the outline."""
+    board = Circles(4, 7, 0.02, "asymmetric", 0.012)
+    picture, truth = photographed(board, (0.3, 0.2, 0.1), 0.3)
+    rng = np.random.default_rng(1)
+    jitter = [cv2.GaussianBlur(rng.normal(0.0, 1.0, picture.shape), (0, 0), 3.0) for _ in "xy"]
+    y, x = np.mgrid[:480, :640].astype(np.float32)
+    dx, dy = (0.2 * part / part.std() for part in jitter)
+    ragged = cv2.remap(
+        picture,
+        (x + dx).astype(np.float32),
+        (y + dy).astype(np.float32),
+        cv2.INTER_CUBIC,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    # an outline has some seven parts that differ: a centre moves by 0.2 px times the root of 2 over 7
+    assert rms_off(see_circles(ragged, board), truth) < 1.5 * 0.2 * np.sqrt(2.0 * 2.0 / 7.0)

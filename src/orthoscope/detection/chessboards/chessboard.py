@@ -59,7 +59,8 @@ ENOUGH_CORNERS_SHARE = 0.25
 SECOND_BOARD_SHARE = 0.5
 # More than this many times the board's corners are a tiled floor, not a board.
 TOO_MANY_RATIO = 1.5
-# Where one lattice has this many times the board's corners, whatever it is, no further copy is looked at.
+# Where one lattice has this many times the board's corners, a floor or a screen's own pattern, no larger copy
+# is looked at.
 FLOOR_RATIO = 6
 
 
@@ -94,10 +95,13 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             " at least 3x3."
         )
     parts: list[_Laid] = []
-    hanging, open_, fits = 0, False, False
+    hanging, open_, fits, largest = 0, False, False, np.inf
     for found, copy, others in _hanging_together(grey):
-        if len(found.pixels) > FLOOR_RATIO * board.columns * board.rows:
+        if max(copy.shape) > largest:
             break
+        if len(found.pixels) > FLOOR_RATIO * board.columns * board.rows:
+            largest = max(copy.shape)
+            continue
         grid = _in_photograph(grey, copy, found, board)
         if grid is None:
             continue

@@ -164,4 +164,5 @@ def _lattice(points: SaddlePoints, members: ndarray, cells: ndarray) -> CornerLa
     even = (cells - cells[0]).sum(
         1
     ) % 2 == 0  # the seed's bright square lies from its first edge to its second
-    return CornerLattice(points.pixels[members], cells, even)
+    by_rows = np.lexsort(cells.T)
+    return CornerLattice(points.pixels[members[by_rows]], cells[by_rows], even[by_rows])

@@ -51,8 +51,8 @@ def see_circles(grey: ndarray, board: Circles) -> Sight | Unseen:
         if copy.shape in shapes or min(copy.shape) < SMALLEST_SIDE:
             continue
         shapes.add(copy.shape)
-        for picture, whole in ((copy, grey), (255 - copy, 255 - grey)):
-            search.look(picture, whole)
+        for white in (False, True):
+            search.look(copy, grey, white=white)
             if search.is_done:
                 return search.best
     return search.outcome
@@ -86,39 +86,41 @@ class _Search:
             return Unseen("is in it in part only, and which part cannot be told")
         return Unseen(f"was not found in it: {self.most} discs hang together, the board has {self.count}")
 
-    def look(self, picture: ndarray, whole: ndarray) -> None:
-        """At dark discs in a copy of a photograph: spots first, then where most that hang together foresee
-        others.
+    def look(self, copy: ndarray, grey: ndarray, *, white: bool) -> None:
+        """At black or white discs in a copy of a photograph: spots first, then where most that hang together
+        foresee others.
         """
         largest, laid = (Ellipses(np.zeros((0, 2)), np.zeros((0, 2, 2))), np.zeros((0, 2), dtype=int)), False
-        for found in spots(picture):
+        for found in spots(255 - copy if white else copy):
             which, places = numbered(found)
             self.most = max(self.most, len(which))
             if len(which) < max(FEWEST_DISCS, LEAST_DISCS_SHARE * self.count, len(self.best.ids)):
                 continue
-            laid |= self._lay(found.of(which), places, picture, whole)
+            laid |= self._lay(found.of(which), places, copy, grey, white=white)
             if self.is_done:
                 return
             if len(which) > len(largest[1]):
                 largest = found.of(which), places
         if not laid and len(largest[1]) >= GROWING_DISCS_SHARE * self.count:
-            smooth = smoothed(picture)
+            smooth = smoothed(copy, white=white)
             rays, places, _ = with_next(smooth, outlines_near(smooth, largest[0]), largest[1])
             if len(places) >= FEWEST_DISCS:
-                self._lay(rays.ellipses, places, picture, whole)
+                self._lay(rays.ellipses, places, copy, grey, white=white)
 
-    def _lay(self, discs: Ellipses, places: Int[ndarray, "n 2"], picture: ndarray, whole: ndarray) -> bool:
+    def _lay(
+        self, discs: Ellipses, places: Int[ndarray, "n 2"], copy: ndarray, grey: ndarray, *, white: bool
+    ) -> bool:
         """Whether these discs are the board's, in one way; then its discs are fitted where some are new."""
-        ids, unsure = laid_on(self.board, discs, places, picture.shape)
+        ids, unsure = laid_on(self.board, discs, places, copy.shape)
         self.several |= unsure
         mine = ids >= 0
         if mine.sum() < FEWEST_DISCS:
             return False
-        centres = to_photograph(discs.centres[mine], picture, whole)
-        rough = Ellipses(centres, discs.axes[mine] * whole.shape[1] / picture.shape[1])
+        centres = to_photograph(discs.centres[mine], copy, grey)
+        rough = Ellipses(centres, discs.axes[mine] * grey.shape[1] / copy.shape[1])
         if _are_new(rough, self.asked):
             self.laid = True
-            sight, asked = _outlined(whole, self.board, rough, ids[mine])
+            sight, asked = _outlined(grey, self.board, rough, ids[mine], white=white)
             self.asked = np.concatenate([self.asked, asked])
             self.best = max(self.best, sight, key=lambda one: len(one.ids))
         return True
@@ -131,7 +133,7 @@ def _are_new(discs: Ellipses, asked: Float[ndarray, "k 2"]) -> bool:
 
 
 def _outlined(
-    grey: ndarray, board: Circles, rough: Ellipses, ids: Int[ndarray, " n"]
+    grey: ndarray, board: Circles, rough: Ellipses, ids: Int[ndarray, " n"], *, white: bool
 ) -> tuple[Sight, Float[ndarray, "k 2"]]:
     """Ids and centres from outlines in the photograph, those of discs that were no spots included, and where
     discs were looked for. What is given out was seen whole in the last fit; where it was foreseen, or rays
@@ -142,8 +144,9 @@ def _outlined(
         board: what to look for.
         rough: spots.
         ids: of these.
+        white: whether discs are white.
     """
-    smooth, on_board = smoothed(grey), board.neighbour_places()
+    smooth, on_board = smoothed(grey, white=white), board.neighbour_places()
     rays, places, may_be, seen = outlines_near(smooth, rough), on_board[ids], on_board, 0
     fine, asked = rays, rough.centres
     while True:

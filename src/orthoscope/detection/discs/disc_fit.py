@@ -5,10 +5,10 @@ is
 
     I(x) = m + C tanh(d / w) + (1 + r tanh(d / w)) g.(x - c),      r = C / m
 
-m grey, C half the step, w blur, g uneven light. Moving c or A by dc, dA moves the outline along its normal n
-by n.(dc + dA u); Gauss-Newton on these and on log w, with m, C and g beside them. All pixels near an outline
-take part, which no threshold and no number of rays gives. What the model lacks (a lens's own blur,
-sharpening, blur as wide as the disc) lies the same way on opposite sides and moves no centre.
+m grey, C half the step (of white discs negative), w blur, g uneven light. Moving c or A by dc, dA moves the
+outline along its normal n by n.(dc + dA u); Gauss-Newton on these and on log w, with m, C and g beside them.
+All pixels near an outline take part, which no threshold and no number of rays gives. What the model lacks (a
+lens's own blur, sharpening, blur as wide as the disc) lies alike on opposite sides and moves no centre.
 
 A slope of light and a moved disc look half alike: left free, the light makes the centre a seventh worse than
 noise must. But light changes evenly over a picture, and all discs together tell it; with that, and with how
@@ -109,7 +109,7 @@ def fit_discs(grey: ndarray, rough: Ellipses) -> FittedDiscs:
     centres = (fit.centres + 0.5) * shrink - 0.5 + first
     outlines = Ellipses(centres, fit.axes * shrink)
     lengths = fit.off, fit.off_spread, fit.blur, fit.centre_spread
-    rest = np.sqrt(fit.noise) / fit.step
+    rest = np.sqrt(fit.noise) / np.abs(fit.step)
     return FittedDiscs(outlines, *(length * shrink for length in lengths), rest)
 
 
@@ -215,7 +215,7 @@ class _Fit:
             each[:, 8:] / level[:, None] for each in (solution, spread)
         )
         self.relief[here] = np.clip(solution[:, 6] / level, -1.0, 1.0)
-        self.centre_spread[here] = spread[:, :2].max(1) / step * self.blur[here]
+        self.centre_spread[here] = spread[:, :2].max(1) / np.abs(step) * self.blur[here]
         limit = LARGEST_STEP_SHARE * self.half[here, None]
         moved = np.clip(solution[:, :5] / step[:, None] * self.blur[here, None], -limit, limit)
         self.centres[here] += moved[:, :2]
@@ -233,7 +233,9 @@ class _Fit:
         sums = (columns[:, :-1] @ columns.transpose(0, 2, 1)).astype(float)
         normal, right = sums[:, :, :-1], sums[:, :, -1]
         alone = np.linalg.solve(normal[:, 6:, 6:] + 1e-6 * np.eye(4), right[:, 6:, None])[:, 0, 0]
-        step = self.step[here] = np.maximum(np.abs(alone), LEAST_HALF_STEP)
+        step = self.step[here] = np.where(
+            np.abs(alone) > LEAST_HALF_STEP, alone, np.copysign(LEAST_HALF_STEP, alone)
+        )
         held = self.noise[here, None] / np.maximum(self.light_spread * self.level[here, None], 1e-9) ** 2
         damping = DAMPING * np.einsum("npp->np", normal) + 1e-6
         usual = self.usual_relief * self.level[here]
@@ -273,7 +275,7 @@ class _Fit:
         )
         scale = (self.blur[here] / self.step[here])[:, None]
         self.off[here] = -scale * total / np.maximum(square, 1e-9)
-        self.off_spread[here] = scale * np.sqrt(self.noise[here, None] / np.maximum(square, 1e-9))
+        self.off_spread[here] = np.abs(scale) * np.sqrt(self.noise[here, None] / np.maximum(square, 1e-9))
 
     def _columns(
         self, here: ndarray, pixels: Pixels, rows: ndarray

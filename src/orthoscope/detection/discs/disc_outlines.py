@@ -47,6 +47,9 @@ FARTHEST_MOVE_RADII = 0.25
 # A sector of a whole disc's outline is off the ellipse by less than this share of a radius, or so many
 # standard deviations.
 MOST_SECTOR_RADII, MOST_SECTOR_SPREADS = 0.02, 4.0
+# What is usual of all discs counts as noise, too: print and sharpening make outlines ragged; up to this share
+# of a radius.
+MOST_RAGGED_RADII = 0.1
 # A fit leaves less of the picture than this, half steps from inside to outside, or than so many times what is
 # usual: the edge of a shadow, glare or a finger moves a disc that it crosses.
 MOST_REST, TIMES_USUAL_REST = 0.1, 3.0
@@ -60,7 +63,7 @@ class Outlines(NamedTuple):
     Attributes:
         ellipses: through them, NaN where there is no whole one.
         roughness: (n,) rms of an outline about its ellipse, in radii.
-        contrast: (n,) from inside to outside, as a share of the outside.
+        contrast: (n,) from black to white, as a share of the white.
         doubt: (n,) how far a sector of it may be off unseen, radii; infinite where it was not fitted whole,
             or is hardly wider than the blur.
     """
@@ -81,13 +84,19 @@ class Outlines(NamedTuple):
         return Outlines(ellipses, *rest)
 
 
-def smoothed(grey: ndarray) -> ndarray:
-    """A picture as `outlines_near` takes it, float32; grey: (h,w) uint8."""
-    return cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA).astype(np.float32)
+def smoothed(grey: ndarray, *, white: bool = False) -> ndarray:
+    """A picture as `outlines_near` takes it, float32.
+
+    Args:
+        grey: (h,w) uint8.
+        white: whether discs are brighter than what is around them; the picture is then less than 0.
+    """
+    smooth = cv2.GaussianBlur(grey, (0, 0), SMOOTHING_SIGMA).astype(np.float32)
+    return -smooth if white else smooth
 
 
 def outlines_near(smooth: ndarray, rough: Ellipses) -> Outlines:
-    """The outlines of discs that are dark, by rays.
+    """The outlines of discs, by rays.
 
     Args:
         smooth: (h,w), as `smoothed` makes it.
@@ -135,7 +144,12 @@ def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
     size = np.sqrt(np.abs(np.linalg.det(found.axes[which])))
     wide = np.abs(np.linalg.eigvalsh(found.axes[which])).min(1, initial=np.inf) > LEAST_BLURS * fit.blur
     taken = wide & (moved < FARTHEST_MOVE_RADII * size)
-    off = np.maximum(MOST_SECTOR_RADII * size[:, None], MOST_SECTOR_SPREADS * fit.spread)
+    ragged = median(np.abs(fit.off[taken])) / 0.6745 if taken.any() else 0.0
+    most = MOST_SECTOR_SPREADS * np.hypot(fit.spread, ragged)
+    off = np.maximum(
+        MOST_SECTOR_RADII * size[:, None],
+        np.minimum(most, MOST_RAGGED_RADII * size[:, None] + MOST_SECTOR_SPREADS * fit.spread),
+    )
     clean = fit.rest < max(MOST_REST, TIMES_USUAL_REST * median(fit.rest))
     smooth = ((np.abs(fit.off) < off).all(1) & clean | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
     centres, axes = found.centres.copy(), found.axes.copy()
@@ -178,5 +192,6 @@ def _outline(
     far_x, far_y = (centres[:, i, None] + arms[:, i] * 1.1 for i in (0, 1))
     in_picture = (far_x > 0) & (far_x < width - 1) & (far_y > 0) & (far_y < height - 1)
     good = rises.any(-1) & in_picture & (outside - inside > LEAST_CONTRAST)
-    contrast = np.median(outside - inside, axis=1) / np.maximum(np.median(outside, axis=1), 1.0)
+    white = np.maximum(np.abs(np.median(outside, axis=1)), np.abs(inside[:, 0]))
+    contrast = np.median(outside - inside, axis=1) / np.maximum(white, 1.0)
     return np.where(good, found, np.nan), np.maximum(contrast, LEAST_SHARE)

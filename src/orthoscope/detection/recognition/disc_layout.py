@@ -31,7 +31,7 @@ NOMINAL = 0.02
 def disc_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
     """The grids of discs that photographs (h,w) show whole, most often seen first."""
     seen: Counter[tuple[int, int, str]] = Counter()
-    diameters: list[float] = []
+    diameters: dict[tuple[int, int, str], list[float]] = {}
     for grey in greys:
         copy = resized(grey, COPY_SIDE)
         for picture in (copy, 255 - copy):
@@ -47,11 +47,12 @@ def disc_boards(greys: Sequence[ndarray]) -> Iterator[Board]:
                     best = len(which), layout, diameter_in_steps(discs, places)
             if best[0]:
                 seen[best[1]] += 1
-                diameters.append(best[2])
+                diameters.setdefault(best[1], []).append(best[2])
                 break
-    for (columns, rows, layout), _ in seen.most_common(2):
+    for counts, _ in seen.most_common(2):
+        columns, rows, layout = counts
         nearest = 1.0 if layout == "symmetric" else np.sqrt(2.0)
-        diameter = round(float(np.median(diameters)) * nearest * NOMINAL, 4)
+        diameter = round(float(np.median(diameters[counts])) * nearest * NOMINAL, 4)
         yield Circles(columns, rows, NOMINAL, layout, min(diameter, 0.95 * nearest * NOMINAL))
 
 

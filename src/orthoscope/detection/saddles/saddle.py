@@ -175,7 +175,7 @@ class _Fit:
         step = in_pixels(
             solution[:, :5] / np.where(np.abs(contrast) < 1e-9, 1e-9, contrast)[:, None], shapes.of(here)
         )
-        step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+        step = np.minimum(np.maximum(step, -LARGEST_STEP), LARGEST_STEP)
         shapes.places[here] += step[:, :2]
         shapes.angles[here] += step[:, 2:4]
         shapes.blur[here] = np.maximum(shapes.blur[here] * np.exp(step[:, 4]), LEAST_BLUR_PX)
