@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from orthoscope.detection.detect import detect
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
-from orthoscope.geometry.arrays import InputError
+from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.targets.aprilgrid import AprilGrid
 from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.markers import dictionary
@@ -93,3 +94,8 @@ def test_a_board_that_cannot_be_is_refused():
         Charuco(7, 5, 0.03, 0.022, "DICT_9X9_50")
     with pytest.raises(InputError, match="markers smaller"):
         Charuco(7, 5, 0.03, 0.03, "DICT_5X5_50")
+
+
+def test_of_a_board_with_the_same_markers_no_part_is_taken_and_it_is_named():
+    with pytest.raises(CalibrationError, match="charuco:7x6:30mm:22mm:DICT_5X5_50"):
+        detect([opencv_picture(7, 6, legacy=False)], "charuco:9x6:30mm:22mm:DICT_5X5_100")

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orthoscope.detection.chessboards.chessboard import board_size, lattice_sizes
+from orthoscope.detection.recognition.marker_layout import marker_boards
 from orthoscope.detection.several_targets import see_members
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.detection.table import check_can_be_seen
@@ -25,9 +26,13 @@ from orthoscope.files.images import MOST_MEGAPIXELS
 from orthoscope.files.pictures import Given, Picture, pictures
 from orthoscope.geometry.arrays import CalibrationError, InputError
 from orthoscope.machine.cores import at_once
+from orthoscope.targets.aprilgrid import AprilGrid
+from orthoscope.targets.board import Board
+from orthoscope.targets.charuco import Charuco
 from orthoscope.targets.chessboard import Chessboard
 from orthoscope.targets.circles import Circles
 from orthoscope.targets.detections import Detections, Remark, SetAside, View, view_name
+from orthoscope.targets.grid_board import GridBoard
 from orthoscope.targets.table import parse_target
 from orthoscope.targets.target import Target
 
@@ -35,6 +40,8 @@ __all__ = ["detect"]
 
 # Where none showed the target the reasons of so many photographs are told.
 LISTED_PHOTOGRAPHS = 5
+# Of these kinds another board is told by its markers.
+MARKED = (Charuco, AprilGrid, GridBoard)
 # Where none showed the target so many photographs are looked at for a board of another size.
 TRIED_PHOTOGRAPHS = 5
 # Lattices of one size in so many of them are a board's.
@@ -186,8 +193,29 @@ def _nothing_found(given: list[Picture], looks: list[_Look], target: Target, asi
     if isinstance(target.board, Chessboard) and (board := _board_instead(readable, target.board)):
         where = readable[0].name if len(readable) == 1 else "them"
         return f"{told} There seems to be {_instead(board, target.board, where)}."
+    if isinstance(target.board, MARKED) and (seen := _markers_instead(readable, target.board)):
+        return (
+            f"{told} The markers in them make {seen}: if that is the one, say so, with its lengths.{reasons}"
+        )
     advice = target.board.advice if target.board else "See that it is whole, sharp and lit"
     return f"{told} {advice}:{reasons}"
+
+
+def _markers_instead(given: list[Picture], board: Board) -> str:
+    """What markers in a few photographs make, where that is another board; nothing where it is not seen."""
+    greys = [picture.grey(most_megapixels=np.inf) for picture in _few(given)]
+    for seen in marker_boards(greys):
+        families = {
+            dictionary.rpartition("_")[0] for dictionary, _ in filter(None, (seen.markers, board.markers))
+        }
+        if type(seen) is not type(board) or seen.grid != board.grid or len(families) > 1:
+            return f"--target {seen.description}"
+    return ""
+
+
+def _few(given: list[Picture]) -> list[Picture]:
+    """Some photographs, evenly picked."""
+    return given[:: max(1, len(given) // TRIED_PHOTOGRAPHS)][:TRIED_PHOTOGRAPHS]
 
 
 def _never_seen(looks: list[_Look], target: Target) -> list[Remark]:
@@ -227,8 +255,7 @@ def _board_instead(given: list[Picture], target: Chessboard) -> tuple[int, int] 
     """The size of the board that a few photographs show, where it is not the target's: by its four sides, or,
     where these are not seen, by the lattice of one size that comes again and again.
     """
-    few = given[:: max(1, len(given) // TRIED_PHOTOGRAPHS)][:TRIED_PHOTOGRAPHS]
-    greys = [picture.grey(most_megapixels=np.inf) for picture in few]
+    greys = [picture.grey(most_megapixels=np.inf) for picture in _few(given)]
     whole = Counter(board for grey in greys if (board := board_size(grey)))
     again = Counter(size for grey in greys for size in lattice_sizes(grey)) if not whole else Counter()
     seen = whole or {size: count for size, count in again.items() if count >= ALIKE_PHOTOGRAPHS}

@@ -97,7 +97,7 @@ def are_off(
     off = np.zeros(len(pixels), dtype=bool)
     if len(pixels) < FEWEST_CORNERS or not np.ptp(places, axis=0).all():
         return off
-    centre, radius = 0.5 * np.array(shape[1::-1]), 0.5 * float(np.hypot(*shape[:2]))
+    centre, radius = 0.5 * np.array(shape[1::-1]), 0.5 * float(np.hypot(shape[0], shape[1]))
     bent = min(BENDS, key=lambda bend: _bent_apart((pixels - centre) / radius, places, bend))
     while off.sum() <= MOST_OUT_SHARE * len(off):
         flat = _bent((pixels[~off] - centre) / radius, places[~off], bent) * radius + centre

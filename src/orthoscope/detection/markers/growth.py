@@ -211,11 +211,12 @@ def _alternate(
     Where tags stand close a corner's neighbour, a true corner too, may be nearer than it is foreseen.
     """
     way = np.sign(contrast) * (1 - 2 * (cells.sum(1) % 2))
-    return way == (1 if way[fits].sum() > 0 else -1)
+    return np.equal(way, 1 if way[fits].sum() > 0 else -1)
 
 
 def _inside(pixels: Float[ndarray, "m 2"], shape: tuple[int, ...]) -> Bool[ndarray, " m"]:
-    return ((pixels >= RIM_PX) & (pixels <= np.array(shape[::-1]) - 1 - RIM_PX)).all(1)
+    inside: ndarray = (pixels >= RIM_PX) & (pixels <= np.array(shape[::-1]) - 1 - RIM_PX)
+    return np.asarray(inside.all(1))
 
 
 def _step(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> float:

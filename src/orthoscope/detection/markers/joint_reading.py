@@ -68,11 +68,11 @@ class Drawings(NamedTuple):
 
     Attributes:
         drawn: (n, bits^2) inside of each marker, the board's first; the mean of all taken out.
-        count: of the board's.
+        board_count: of the board's.
     """
 
     drawn: Float[ndarray, "n p"]
-    count: int
+    board_count: int
 
 
 class Way(NamedTuple):
@@ -132,7 +132,7 @@ def seen_squares(grey: ndarray, quads: Float[ndarray, "r c 4 2"], bits: int, rim
     bottom = (1.0 - across) * quads[:, :, 3] + across * quads[:, :, 2]
     at = (1.0 - down) * top + down * bottom  # (down, across, rows, columns, 2)
     rows, columns = quads.shape[:2]
-    inside = ((at >= 0) & (at <= np.array(grey.shape[::-1]) - 1)).all((0, 1, 4))
+    inside = np.asarray(((at >= 0) & (at <= np.array(grey.shape[::-1]) - 1)).all((0, 1, 4)))
     x, y = (
         np.where(inside[..., None], at, 0.0).astype(np.float32).reshape(len(u) ** 2, -1, 2).transpose(2, 0, 1)
     )
@@ -215,7 +215,7 @@ def _told(squares: Squares, turns: int, markers: Drawings) -> Float[ndarray, "r 
     turned = np.rot90(np.rot90(squares.values, turns, axes=(2, 3)), turns)
     rows, columns = turned.shape[:2]
     alike = turned.reshape(rows, columns, -1) @ markers.drawn.T
-    more = alike[..., : markers.count] - alike.mean(-1, keepdims=True)
+    more = alike[..., : markers.board_count] - alike.mean(-1, keepdims=True)
     return more / (alike.std(-1, keepdims=True) + 1e-6)
 
 

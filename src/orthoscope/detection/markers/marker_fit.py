@@ -189,7 +189,7 @@ class _Fit:
         leaves, be it as small, does not: it moves the corner as noise of so many times the variance would.
         """
         sigma = max(self.blur, LEAST_COHERENCE_BLUR)
-        left, there = np.zeros((2, *self._picture.shape), np.float32)
+        left, there = np.zeros_like(self._picture), np.zeros_like(self._picture)
         left.put(self._inside, self._left)
         there.put(self._inside, 1.0)
         rim = cv2.BORDER_CONSTANT

@@ -32,6 +32,8 @@ LOOSE_SHARE = 0.6
 HARDLY_ANY = 2
 # Another board alike shows at least so many markers, and this share of those of the one that was taken.
 FEWEST_TWICE, TWICE_SHARE = 2, 0.25
+# Where less than this share of the markers hangs together, they are of a board of another size.
+LEAST_HANGING_SHARE = 0.3
 # So many neighbours of a marker on the board foresee it.
 NEIGHBOUR_COUNT = 6
 
@@ -120,7 +122,8 @@ def of_one_board(markers: Markers, plane: Float[ndarray, "n 4 2"]) -> Bool[ndarr
         off = np.linalg.norm(foreseen - markers.corners[near[i]], axis=-1).max(1)
         fits = (off < LOOSE_SHARE * sides[near[i]]) & (apart[i, near[i]] > 0)
         linked[i, near[i][fits]] = linked[near[i][fits], i] = True
-    return _largest(linked)
+    mine = _largest(linked)
+    return mine if mine.sum() >= LEAST_HANGING_SHARE * count else np.zeros(count, dtype=bool)
 
 
 def _largest(linked: Bool[ndarray, "n n"]) -> Bool[ndarray, " n"]:
