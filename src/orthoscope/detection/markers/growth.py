@@ -36,7 +36,7 @@ SADDLE_UNKNOWNS = 9
 # A sight of a board has at least this many corners.
 FEWEST_CORNERS = 4
 # Where no more than this share of the corners is missing the whole board is seen.
-MOST_MISSING_SHARE = 0.15
+MOST_MISSING_SHARE = 0.05
 # Two ways to find corners have them in the same places, within this share of a step.
 MOST_APART_SHARE = 0.3
 
