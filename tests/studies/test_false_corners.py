@@ -57,7 +57,7 @@ def test_lines_that_leap_by_a_knight_s_move_are_parted():
     sight = see(shown.picture, shown.target)
     assert isinstance(sight, Sight)
     assert len(sight.ids) >= 30
-    assert errors_of(shown, sight).max() < 0.2
+    assert errors_of(shown, sight).max() < 0.5
 
 
 def test_marks_that_blur_hides_do_not_turn_a_board_into_its_negative():

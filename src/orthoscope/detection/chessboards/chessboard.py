@@ -95,6 +95,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             " at least 3x3."
         )
     parts: list[_Laid] = []
+    count = board.columns * board.rows
     hanging, open_, fits, largest = 0, False, False, np.inf
     for found, copy, others in _hanging_together(grey):
         if max(copy.shape) > largest:
@@ -109,8 +110,8 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
         if any(seen <= part.sure.sum() for part in parts):
             continue  # of this copy no more can be sure
         sight = _on_board(grey, grid, board)
-        open_ |= sight is None
-        if sight and len(sight.ids) == board.columns * board.rows:
+        open_ |= sight is None and seen >= ENOUGH_CORNERS_SHARE * count and is_even(grey, grid)
+        if sight and len(sight.ids) == count and (any(grid.ends) or sight.sure.all()):
             large = (other for other in others if len(other.pixels) >= SECOND_BOARD_SHARE * len(sight.ids))
             alike = any(_is_whole(_in_photograph(grey, copy, other, board), board) for other in large)
             return _sure(grey, sight, board, TWICE if alike else "")
@@ -118,7 +119,6 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
             hanging, fits = max(hanging, seen), fits or _may_be_whole(grey, grid, board)
         parts += [sight] if sight and len(sight.ids) >= FEWEST_PART_CORNERS else []
     best = max(parts, key=lambda sight: int(sight.sure.sum()), default=None)
-    count = board.columns * board.rows
     enough = ENOUGH_CORNERS_SHARE * count <= hanging <= TOO_MANY_RATIO * count
     if best is None and fits and enough and hanging != count:
         best = _by_opencv(grey, board)
