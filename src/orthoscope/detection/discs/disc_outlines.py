@@ -151,7 +151,7 @@ def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
         np.minimum(most, MOST_RAGGED_RADII * size[:, None] + MOST_SECTOR_SPREADS * fit.spread),
     )
     clean = fit.rest < max(MOST_REST, TIMES_USUAL_REST * median(fit.rest))
-    smooth = ((np.abs(fit.off) < off).all(1) & clean | ~taken) & (fit.centre_spread < WIDEST_SPREAD)
+    smooth = ((np.abs(fit.off) < off).all(1) | ~taken) & clean & (fit.centre_spread < WIDEST_SPREAD)
     centres, axes = found.centres.copy(), found.axes.copy()
     centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
     centres[which[~smooth]], axes[which[~smooth]] = np.nan, np.nan

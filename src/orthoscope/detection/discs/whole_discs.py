@@ -22,8 +22,9 @@ FEWEST_FORESEEING = 5
 MOST_ROUGH, SMOOTH_RADII = 3.0, 0.03
 # A disc's radius is at most this share off what those near it foresee, or so many times the usual share.
 MOST_OFF_SIZE, TIMES_OFF_SIZE = 0.1, 5.0
-# A disc's contrast is at most this share off, or so many times the usual share.
-MOST_OFF_CONTRAST, TIMES_OFF_CONTRAST = 0.15, 5.0
+# A disc's contrast is at most this share off, that of one that may be covered the second share, or so many
+# times the usual one.
+MOST_OFF_CONTRAST, SUSPECT_OFF_CONTRAST, TIMES_OFF_CONTRAST = 0.15, 0.05, 5.0
 # The parabola of contrasts goes, so many times, through those that are off by less than so many times the
 # usual.
 MOST_ROUNDS, MOST_TIMES_USUAL = 4, 3.0
@@ -71,7 +72,8 @@ def are_whole(discs: Outlines, places: Int[ndarray, "n 2"]) -> Bool[ndarray, " n
     low, high = (px / radii for px in SUSPECT_OFF_PX)
     farthest = np.where(suspect, np.clip(usual, low, high), max(MOST_OFF_PLACE, usual))
     good &= off_place < np.where(discs.doubt < LEAST_DOUBT, SURELY_NEAR, farthest)
-    good &= off_contrast < max(MOST_OFF_CONTRAST, TIMES_OFF_CONTRAST * median(off_contrast))
+    least = np.where(suspect, SUSPECT_OFF_CONTRAST, MOST_OFF_CONTRAST)
+    good &= off_contrast < np.maximum(least, TIMES_OFF_CONTRAST * median(off_contrast))
     return good & (off_size < max(MOST_OFF_SIZE, TIMES_OFF_SIZE * median(off_size)))
 
 

@@ -25,7 +25,7 @@ from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 __all__ = ["are_off", "next_corners"]
 
 # Corners are off beyond so many times what is usual at their place.
-TIMES_USUAL = 4.0
+TIMES_USUAL = 5.5
 # And beyond at least this, pixels.
 LEAST_PX = 0.6
 # An order is compared with the one before and so many beyond it: of a lens every other one is small.

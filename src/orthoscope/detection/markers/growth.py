@@ -31,8 +31,12 @@ MOST_TRIES, MOVED_SHARE = 3, 0.12
 FARTHEST_SHARE, LEAST_STEP_PX = 0.4, 10.0
 # What is seen roughly is where others foresee it to this share of a step.
 ROUGHLY_SHARE = 0.15
-# A saddle's fit has so many unknowns.
-SADDLE_UNKNOWNS = 9
+# A saddle's fit has so many unknowns; a window with less than so many times as many pixels is small.
+SADDLE_UNKNOWNS, PIXELS_OF_SMALL = 9, 3.0
+# In a small window blur may be taken for contrast: it has less than so many times the usual.
+MOST_CONTRAST_RATIO = 2.0
+# A corner that is sure moves by less than this, pixels, when it is fitted once more.
+STEADY_PX = 0.5
 # A sight of a board has at least this many corners.
 FEWEST_CORNERS = 4
 # Where no more than this share of the corners is missing the whole board is seen.
@@ -108,9 +112,10 @@ def grown_from(
     missing = int((_inside(start, grey.shape) & ~good).sum())
     if fine is None:
         return Grown(start, good, False)
+    before = fine.pixels
     fine, good = _once_more(grey, fine, good, board)
     pixels = np.where(good[:, None], fine.pixels, np.nan)
-    sure = good & fine.sure & fine.whole
+    sure = good & fine.sure & fine.whole & (np.hypot(*(fine.pixels - before).T) < STEADY_PX)
     sure[sure] = _have_pixels_enough(fine.of(sure), places[sure])
     return Grown(pixels, sure, missing <= MOST_MISSING_SHARE * good.sum())
 
@@ -145,7 +150,11 @@ def _have_pixels_enough(fine: Refined, places: Float[ndarray, "k 2"]) -> Bool[nd
     """
     shape = grid_shape(fine.pixels, places)
     pixels = (2.0 * WINDOW_SHARE) ** 2 * np.abs(cross(shape.along, shape.down))
-    return fine.spread * np.sqrt(pixels / np.maximum(pixels - SADDLE_UNKNOWNS, 1.0)) < WIDEST_SPREAD
+    small, contrast = pixels < PIXELS_OF_SMALL * SADDLE_UNKNOWNS, np.abs(fine.contrast)
+    spread = np.where(small, np.maximum(fine.spread, median(fine.spread)), fine.spread)
+    spread = spread * np.sqrt(pixels / np.maximum(pixels - SADDLE_UNKNOWNS, 1.0))
+    usual = contrast < MOST_CONTRAST_RATIO * median(contrast)
+    return (spread < WIDEST_SPREAD) & (usual | ~small)
 
 
 def _fit(
