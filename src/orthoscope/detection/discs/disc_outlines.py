@@ -42,6 +42,8 @@ LEAST_BLURS = 1.1
 # Of a sure centre the standard deviation is less than this, pixels: it is within a pixel then, as good as
 # always.
 WIDEST_SPREAD = 0.2
+# Where rays cross the outline, a centre's standard deviation is so many times that of the fit to all pixels.
+SPREAD_BY_RAYS = 1.5
 # The fit of a whole disc ends within this share of its radius from there.
 FARTHEST_MOVE_RADII = 0.25
 # A sector of a whole disc's outline is off the ellipse by less than this share of a radius, or so many
@@ -151,7 +153,8 @@ def fitted_whole(grey: ndarray, outlines: Outlines) -> Outlines:
         np.minimum(most, MOST_RAGGED_RADII * size[:, None] + MOST_SECTOR_SPREADS * fit.spread),
     )
     clean = fit.rest < max(MOST_REST, TIMES_USUAL_REST * median(fit.rest))
-    smooth = ((np.abs(fit.off) < off).all(1) | ~taken) & clean & (fit.centre_spread < WIDEST_SPREAD)
+    spread = np.where(taken, fit.centre_spread, SPREAD_BY_RAYS * fit.centre_spread)
+    smooth = ((np.abs(fit.off) < off).all(1) | ~taken) & clean & (spread < WIDEST_SPREAD)
     centres, axes = found.centres.copy(), found.axes.copy()
     centres[which[taken]], axes[which[taken]] = fit.ellipses.centres[taken], fit.ellipses.axes[taken]
     centres[which[~smooth]], axes[which[~smooth]] = np.nan, np.nan

@@ -33,10 +33,12 @@ MOST_ROUNDS, MOST_TIMES_USUAL = 4, 3.0
 MOST_OFF_PLACE, TIMES_OFF_PLACE = 0.15, 6.0
 # One that is rough, of another size or hardly wider than the blur is off by at most so many times the usual,
 # but within these, pixels.
-SUSPECT_OFF_PX = 0.5, 0.8
+SUSPECT_OFF_PX = 0.4, 0.6
 # Where no sector of an outline can be off by so much unseen, radii, it is all of a disc, and within so many
 # radii of where others foresee it, which a lens's curve makes uncertain, it is the board's.
 LEAST_DOUBT, SURELY_NEAR = 0.05, 1.0
+# Where a sector may be off by more than this unseen, radii, the disc may be covered.
+MOST_DOUBT = 0.1
 # A disc whose outline is rougher than this, radii, and than so many times the usual, or its radius off by
 # more than this share, may be covered.
 SURELY_SMOOTH, SUSPECT_ROUGH, SURELY_AS_LARGE = 0.015, 2.0, 0.03
@@ -65,7 +67,7 @@ def are_whole(discs: Outlines, places: Int[ndarray, "n 2"]) -> Bool[ndarray, " n
     off_size, off_contrast = np.abs(off[:, 2]), _off_parabola(places, np.log(discs.contrast))
     usual = TIMES_OFF_PLACE * median(off_place)
     suspect = (
-        np.isinf(discs.doubt)
+        (discs.doubt > MOST_DOUBT)
         | (roughness > max(SURELY_SMOOTH, SUSPECT_ROUGH * median(roughness)))
         | (off_size > SURELY_AS_LARGE)
     )

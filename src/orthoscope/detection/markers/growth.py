@@ -33,6 +33,8 @@ FARTHEST_SHARE, LEAST_STEP_PX = 0.4, 10.0
 ROUGHLY_SHARE = 0.15
 # A saddle's fit has so many unknowns; a window with less than so many times as many pixels is small.
 SADDLE_UNKNOWNS, PIXELS_OF_SMALL = 9, 3.0
+# In a window with fewer pixels than this a corner is not told from the next one.
+FEWEST_PIXELS = 4.0
 # In a small window blur may be taken for contrast: it has less than so many times the usual.
 MOST_CONTRAST_RATIO = 2.0
 # A corner that is sure moves by less than this, pixels, when it is fitted once more.
@@ -154,7 +156,7 @@ def _have_pixels_enough(fine: Refined, places: Float[ndarray, "k 2"]) -> Bool[nd
     spread = np.where(small, np.maximum(fine.spread, median(fine.spread)), fine.spread)
     spread = spread * np.sqrt(pixels / np.maximum(pixels - SADDLE_UNKNOWNS, 1.0))
     usual = contrast < MOST_CONTRAST_RATIO * median(contrast)
-    return (spread < WIDEST_SPREAD) & (usual | ~small)
+    return (spread < WIDEST_SPREAD) & (usual | ~small) & (pixels > FEWEST_PIXELS)
 
 
 def _fit(

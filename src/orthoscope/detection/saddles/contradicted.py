@@ -31,6 +31,8 @@ MOST_OF_SHAPE = (5.0, 15.0)
 NOISY_SPREADS = 2.0
 # A doubtful corner, and any other, that is off by less than this, pixels, stays.
 LITTLE = (0.25, 0.5)
+# Whose own weight among the others is more than this they do not foresee: a doubtful one goes.
+MOST_WEIGHT = 0.85
 # With fewer corners the others say nothing.
 FEWEST_CORNERS = 8
 # A corner nearer to the picture's rim than this, pixels, may not be seen.
@@ -70,11 +72,13 @@ def are_contradicted(
         usual = median(residual) / MEDIAN_LENGTH
         times = MOST_OF_NOISE if usual < NOISY_SPREADS * median(spread[on]) else MOST_OF_SHAPE
         of_doubtful, of_others = (max(most * usual, least) for most, least in zip(times, LITTLE, strict=True))
-        if residual.max() <= of_doubtful:
+        alone = weight > MOST_WEIGHT
+        if residual.max() <= of_doubtful and not alone.any():
             break
         if not len(little):
             little = doubtful | _beside_lost(pixels, cells, counts, image_size)
         excess = residual / np.where(little[on], of_doubtful, of_others)
+        excess[alone & little[on]] = np.inf
         if excess.max() <= 1.0:
             break
         off[on[excess.argmax()]] = True
