@@ -26,6 +26,8 @@ __all__ = ["are_off", "next_corners"]
 
 # Corners are off beyond so many times what is usual at their place.
 TIMES_USUAL = 5.5
+# How far a doubtful corner is off counts so many times.
+DOUBTFUL_TIMES = 1.4
 # And beyond at least this, pixels.
 LEAST_PX = 0.6
 # An order is compared with the one before and so many beyond it: of a lens every other one is small.
@@ -85,6 +87,7 @@ def are_off(
     shape: tuple[int, ...],
     *,
     least: float = LEAST_PX,
+    doubtful: Bool[ndarray, " m"] | None = None,
 ) -> Bool[ndarray, " m"]:
     """Which corners are off.
 
@@ -93,6 +96,7 @@ def are_off(
         places: where the board has them.
         shape: of the picture.
         least: what is no farther off is not off, pixels.
+        doubtful: which are off sooner: something may lie beside them.
     """
     off = np.zeros(len(pixels), dtype=bool)
     if len(pixels) < FEWEST_CORNERS or not np.ptp(places, axis=0).all():
@@ -102,6 +106,8 @@ def are_off(
     while off.sum() <= MOST_OUT_SHARE * len(off):
         flat = _bent((pixels[~off] - centre) / radius, places[~off], bent) * radius + centre
         excess = _excess(pixels[~off] - flat, places[~off], least)
+        if doubtful is not None:
+            excess = np.where(doubtful[~off], DOUBTFUL_TIMES * excess, excess)
         if excess.max() <= 1.0:
             break
         off[np.flatnonzero(~off)[excess.argmax()]] = True

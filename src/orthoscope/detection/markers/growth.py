@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from orthoscope.detection.chessboards.grid import cross, grid_shape, nearest_neighbour
@@ -181,8 +182,18 @@ def sight_of(grown: Grown, board: CornersOfBoard, shape: tuple[int, ...], remark
     """
     ids = np.flatnonzero(grown.sure)
     ids = ids[are_linked(grown.pixels[ids], board.cells[ids], board.places[ids])]
-    ids = ids[~are_off(grown.pixels[ids], board.places[ids], shape)]
+    doubtful = _beside_lost(ids, board.cells)
+    ids = ids[~are_off(grown.pixels[ids], board.places[ids], shape, doubtful=doubtful)]
     return Sight(ids, grown.pixels[ids], remark) if len(ids) >= FEWEST_CORNERS else None
+
+
+def _beside_lost(ids: Int[ndarray, " k"], cells: Int[ndarray, "m 2"]) -> Bool[ndarray, " k"]:
+    """Which of some corners are next to one of the board's that is not among them."""
+    lost = np.zeros(cells.max(0) + 3, dtype=np.uint8)
+    lost[tuple((cells + 1).T)] = 1
+    lost[tuple((cells[ids] + 1).T)] = 0
+    near = cv2.dilate(lost, np.ones((3, 3), np.uint8))
+    return near[tuple((cells[ids] + 1).T)].astype(bool)
 
 
 def grown_with(
