@@ -104,8 +104,11 @@ def are_off(
     centre, radius = 0.5 * np.array(shape[1::-1]), 0.5 * float(np.hypot(shape[0], shape[1]))
     bent = min(BENDS, key=lambda bend: _bent_apart((pixels - centre) / radius, places, bend))
     while off.sum() <= MOST_OUT_SHARE * len(off):
-        flat = _bent((pixels[~off] - centre) / radius, places[~off], bent) * radius + centre
-        excess = _excess(pixels[~off] - flat, places[~off], least)
+        excess = np.zeros(int((~off).sum()))
+        for method in (0, cv2.LMEDS):  # several that are mistaken together draw the first to themselves
+            flat = _bent((pixels[~off] - centre) / radius, places[~off], bent, method) * radius + centre
+            if np.isfinite(flat).all():
+                excess = np.maximum(excess, _excess(pixels[~off] - flat, places[~off], least))
         if doubtful is not None:
             excess = np.where(doubtful[~off], DOUBTFUL_TIMES * excess, excess)
         if excess.max() <= 1.0:
@@ -119,10 +122,12 @@ def _bent_apart(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], be
     return median(np.hypot(*(_bent(pixels, places, bend) - pixels).T))
 
 
-def _bent(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], bend: float) -> Float[ndarray, "m 2"]:
+def _bent(
+    pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], bend: float, method: int = 0
+) -> Float[ndarray, "m 2"]:
     """Where a lens that bends so has the corners of a flat board: r_straight = r / (1 - bend r^2)."""
     straight = pixels / np.maximum(1.0 - bend * (pixels**2).sum(1), LEAST_STRAIGHTENED)[:, None]
-    homography, _ = cv2.findHomography(places, straight, 0)
+    homography, _ = cv2.findHomography(places, straight, method)
     if homography is None:
         return np.full_like(pixels, np.inf)
     there = cv2.perspectiveTransform(places[None].astype(float), homography)[0]
