@@ -12,7 +12,7 @@ import numpy as np
 
 from orthoscope.detection.chessboards.lattices import CornerLattice
 from orthoscope.detection.chessboards.partial_board import on_lines
-from orthoscope.detection.markers.board_lattices import board_corners
+from orthoscope.detection.markers.board_lattices import corners_by_lattice
 from orthoscope.detection.markers.foreseen import next_corners
 from orthoscope.detection.markers.joint_reading import (
     Drawings,
@@ -42,7 +42,7 @@ def aprilgrid_corners(grey: ndarray, board: AprilGrid) -> tuple[Float[ndarray, "
         grey: (h,w) uint8.
         board: what to look for.
     """
-    return board_corners(grey, partial(_placed, grey, board), longest_step=TILTED / board.spacing)
+    return corners_by_lattice(grey, partial(_placed, grey, board), longest_step=TILTED / board.spacing)
 
 
 def _placed(grey: ndarray, board: AprilGrid, lattice: CornerLattice) -> Float[ndarray, "m 2"] | None:

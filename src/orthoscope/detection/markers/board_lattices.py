@@ -16,7 +16,7 @@ from orthoscope.detection.sight import TWICE
 from orthoscope.detection.small_copies import enlarged, resized, to_photograph
 from orthoscope.geometry.arrays import Float, median, ndarray
 
-__all__ = ["board_corners"]
+__all__ = ["corners_by_lattice"]
 
 # Copies have these longer sides, pixels; most boards are found in the first.
 COPY_SIDES = (640, 320, 1280, 2560)
@@ -37,7 +37,7 @@ LARGE_STEP_PX = 20.0
 ENOUGH_CORNERS_SHARE = 0.5
 
 
-def board_corners(
+def corners_by_lattice(
     grey: ndarray,
     placed: Callable[[CornerLattice], Float[ndarray, "m 2"] | None],
     *,

@@ -8,7 +8,7 @@ import numpy as np
 
 from orthoscope.detection.chessboards.lattices import CornerLattice
 from orthoscope.detection.chessboards.partial_board import filled, without_strays
-from orthoscope.detection.markers.board_lattices import board_corners
+from orthoscope.detection.markers.board_lattices import corners_by_lattice
 from orthoscope.detection.markers.joint_reading import Way, drawings_of, likeliest_way, seen_squares
 from orthoscope.geometry.arrays import Float, Int, ndarray
 from orthoscope.targets.charuco import Charuco
@@ -24,7 +24,7 @@ def charuco_corners(grey: ndarray, board: Charuco) -> tuple[Float[ndarray, "m 2"
         grey: (h,w) uint8.
         board: what to look for.
     """
-    return board_corners(grey, partial(_placed, grey, board))
+    return corners_by_lattice(grey, partial(_placed, grey, board))
 
 
 def _placed(grey: ndarray, board: Charuco, lattice: CornerLattice) -> Float[ndarray, "m 2"] | None:
