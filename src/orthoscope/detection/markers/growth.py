@@ -35,7 +35,7 @@ ROUGHLY_SHARE = 0.15
 # A saddle's fit has so many unknowns; a window with less than so many times as many pixels is small.
 SADDLE_UNKNOWNS, PIXELS_OF_SMALL = 9, 3.0
 # In a window with fewer pixels than this a corner is not told from the next one.
-FEWEST_PIXELS = 4.0
+FEWEST_PIXELS = 6.0
 # In a small window blur may be taken for contrast: it has less than so many times the usual.
 MOST_CONTRAST_RATIO = 2.0
 # A corner that is sure moves by less than this, pixels, when it is fitted once more.
