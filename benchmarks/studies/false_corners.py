@@ -27,11 +27,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from benchmarks.studies.true_places import margin_of, true_places
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
-from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
-from orthoscope.geometry.pose import Pose
 from orthoscope.models.camera import Camera
 from orthoscope.models.intrinsics import Intrinsics
 from orthoscope.models.lenses.table import Brown, KannalaBrandt
@@ -118,8 +117,6 @@ def _photograph(number: int, rng: np.random.Generator) -> Shown | None:
     contrast = float(rng.uniform(*quality.contrast))
     fill = float(np.exp(rng.uniform(*np.log(FILLS))))
     tilt, whole = float(rng.uniform(0.0, STEEPEST)), bool(rng.integers(OVER_RIM))
-    drawing = target.drawing()
-    ends = np.abs([drawing.low - target.points.min(0)[:2], drawing.high - target.points.max(0)[:2]])
     try:
         (pose,) = random_views(
             camera,
@@ -129,13 +126,13 @@ def _photograph(number: int, rng: np.random.Generator) -> Shown | None:
             tilt=(tilt, tilt),
             fill=(fill, fill),
             whole=whole,
-            margin=float(np.max(ends)),
+            margin=margin_of(target),
         )
     except CalibrationError:  # a wide board, tilted so, does not fill so much
         return None
     plain = _renderer(which, blur).photograph(target, pose, rng=rng).astype(float)
     dull = 110.0 + (plain - 110.0) * contrast / (WHITE_LEVEL - BLACK_LEVEL)
-    truth = _truth(camera, target, pose)
+    truth = true_places(camera, target, pose)
     covered = not rng.integers(COVERED)
     if covered:
         dull = _covered(dull, truth, blur, rng)
@@ -146,13 +143,6 @@ def _photograph(number: int, rng: np.random.Generator) -> Shown | None:
         f"{' covered' if covered else ''}"
     )
     return Shown(number, target, name, told, picture, truth)
-
-
-def _truth(camera: Camera, target: Target, pose: Pose) -> Float[ndarray, "m 2"]:
-    truth = camera.project(pose.apply(target.points))
-    if target.disc_radii.any():
-        truth = truth + disc_offsets(camera, pose, target.points, target.disc_radii)
-    return truth
 
 
 def _covered(

@@ -21,10 +21,10 @@ import cv2
 import numpy as np
 
 from benchmarks.studies.opencv_finders import FINDERS, apart
+from benchmarks.studies.true_places import margin_of, true_places
 from orthoscope.detection.detect import detect
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
-from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.methods import calibrate
 from orthoscope.models.camera import Camera
@@ -53,16 +53,12 @@ class Photograph(NamedTuple):
 def photographs_of(target: Target, count: int, *, seed: int = 0, camera: Camera = CAMERA) -> list[Photograph]:
     """So many photographs of a target, all of it in each."""
     rng, renderer = np.random.default_rng(seed), Renderer(camera)
-    drawing = target.drawing()
-    ends = np.abs([drawing.low - target.points.min(0)[:2], drawing.high - target.points.max(0)[:2]])
     views = random_views(
-        camera, target, count, rng=rng, tilt=TILTS, fill=(0.6, 0.9), margin=float(np.max(ends))
+        camera, target, count, rng=rng, tilt=TILTS, fill=(0.6, 0.9), margin=margin_of(target)
     )
     found = []
     for pose in views:
-        truth = camera.project(pose.apply(target.points))
-        if target.disc_radii.any():
-            truth = truth + disc_offsets(camera, pose, target.points, target.disc_radii)
+        truth = true_places(camera, target, pose)
         found.append(Photograph(renderer.photograph(target, pose, rng=rng), truth))
     return found
 

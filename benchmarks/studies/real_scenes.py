@@ -28,9 +28,9 @@ import numpy as np
 from benchmarks.real_sets import SETS, datasets
 from benchmarks.studies.false_corners import BOARDS, Shown, errors_of
 from benchmarks.studies.opencv_finders import FINDERS, apart
+from benchmarks.studies.true_places import margin_of, true_places
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
-from orthoscope.fitting.disc_centres import disc_offsets
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
 from orthoscope.models.camera import Camera
 from orthoscope.models.intrinsics import Intrinsics
@@ -179,20 +179,16 @@ def _photograph(number: int, spec: str, rng: np.random.Generator) -> Shown | Non
     doing = DISTURBANCES[name]
     blur, tilt = float(rng.choice([0.5, 0.8, 1.1])), float(rng.uniform(0.0, STEEPEST))
     fill = float(np.exp(rng.uniform(*np.log(FILLS))))
-    drawing, low, high = target.drawing(), target.points.min(0)[:2], target.points.max(0)[:2]
-    margin = float(np.max(np.abs([drawing.low - low, drawing.high - high])))
     try:
         (pose,) = random_views(
-            doing.camera, target, 1, rng=rng, tilt=(tilt, tilt), fill=(fill, fill), margin=margin
+            doing.camera, target, 1, rng=rng, tilt=(tilt, tilt), fill=(fill, fill), margin=margin_of(target)
         )
     except CalibrationError:  # a wide board, tilted so, does not fill so much
         return None
     plain = _renderer(doing.camera is WIDE, blur).photograph_of(
         [(target, pose)], rng=rng, behind=room(spec, rng)
     )
-    truth = doing.camera.project(pose.apply(target.points))
-    if target.disc_radii.any():
-        truth = truth + disc_offsets(doing.camera, pose, target.points, target.disc_radii)
+    truth = true_places(doing.camera, target, pose)
     picture = np.clip(np.rint(doing.change(plain.astype(float), truth, rng)), 0, 255).astype(np.uint8)
     told = f"blur {blur:g} fill {fill:.2f} tilt {np.rad2deg(tilt):.0f}"
     return Shown(number, target, name, told, picture, truth)

@@ -100,7 +100,7 @@ def see_chessboard(grey: ndarray, board: Chessboard | MarkedChessboard) -> Sight
     for found, copy, others in _hanging_together(grey):
         if max(copy.shape) > largest:
             break
-        if len(found.pixels) > FLOOR_RATIO * board.columns * board.rows:
+        if len(found.pixels) > FLOOR_RATIO * count:
             largest = max(copy.shape)
             continue
         grid = _in_photograph(grey, copy, found, board)

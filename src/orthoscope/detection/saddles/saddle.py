@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.memory import Memory
+from orthoscope.detection.reused_arrays import ReusedArrays
 from orthoscope.detection.saddles.saddle_windows import COLUMN_COUNT, Shapes, Windows
 from orthoscope.geometry.arrays import Float, median, ndarray
 
@@ -57,7 +57,7 @@ USUAL_LIGHT = 0.02
 # So many pixels of all windows are done together, so that the arrays stay in cache.
 PIXELS_AT_ONCE = 80_000
 # Of the windows of one batch, whose next begins when it is done.
-MEMORY = Memory()
+ARRAYS = ReusedArrays()
 
 
 class Saddles(NamedTuple):
@@ -153,7 +153,7 @@ class _Fit:
                 shares[some] * self.along[some],
                 shares[some] * self.down[some],
                 self.arms[some] / shares[some, 0],
-                MEMORY,
+                ARRAYS,
             )
             rows = np.arange(len(some))
             for _ in range(STAGE_STEPS):

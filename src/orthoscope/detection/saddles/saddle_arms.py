@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.memory import Memory
+from orthoscope.detection.reused_arrays import ReusedArrays
 from orthoscope.detection.saddles.saddle import Saddles, in_pixels
 from orthoscope.detection.saddles.saddle_windows import ARM_COUNT, Shapes, Windows
 from orthoscope.geometry.arrays import Float, ndarray
@@ -29,7 +29,7 @@ __all__ = ["SaddleArms", "saddle_arms"]
 # So many windows are done together.
 WINDOWS_AT_ONCE = 48
 # Of the windows of one batch.
-MEMORY = Memory()
+ARRAYS = ReusedArrays()
 # Each column's own square is raised by this share of it: of the squares, the arms' shifts, turns and the
 # blur, and the light, which changes little in a window.
 DAMPING = np.array([1e-6] * 4 + [1e-3] * (2 * ARM_COUNT + 1) + [0.03] * 2)
@@ -96,7 +96,7 @@ def saddle_arms(
     for first in range(0, len(order), WINDOWS_AT_ONCE):
         some = order[first : first + WINDOWS_AT_ONCE]
         every, contrast = np.arange(len(some)), saddles.contrast[some]
-        windows = Windows(grey, shapes.places[some], along[some], down[some], arms[some], MEMORY)
+        windows = Windows(grey, shapes.places[some], along[some], down[some], arms[some], ARRAYS)
         for step in range(STEPS):
             sums = windows.arm_sums(every, shapes.of(some))
             if not step:

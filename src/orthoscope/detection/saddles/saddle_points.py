@@ -19,7 +19,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.detection.memory import Memory
+from orthoscope.detection.reused_arrays import ReusedArrays
 from orthoscope.geometry.arrays import Float, ndarray
 
 __all__ = ["SaddlePoints", "saddle_points"]
@@ -28,7 +28,7 @@ __all__ = ["SaddlePoints", "saddle_points"]
 BLUR_SIGMA = 1.5
 KERNEL = cv2.getGaussianKernel(13, BLUR_SIGMA, cv2.CV_32F)
 # Of one picture at a time.
-MEMORY = Memory()
+ARRAYS = ReusedArrays()
 # The circle about a saddle has this radius, pixels.
 CIRCLE_RADIUS = 5.0
 # So many places on the circle are looked at.
@@ -64,7 +64,7 @@ class SaddlePoints(NamedTuple):
 
 def saddle_points(grey: ndarray) -> SaddlePoints:
     """The corners of four squares in a picture (h,w) uint8."""
-    smooth = cv2.sepFilter2D(grey, cv2.CV_32F, KERNEL, KERNEL, dst=MEMORY.of("smooth", grey.shape))
+    smooth = cv2.sepFilter2D(grey, cv2.CV_32F, KERNEL, KERNEL, dst=ARRAYS.of("smooth", grey.shape))
     strength = _strength(smooth)
     x, y = _peaks(strength)
     pixels = np.stack([x, y], axis=1).astype(np.float32)
@@ -102,7 +102,7 @@ def _around(smooth: ndarray, pixels: ndarray, samples: int) -> tuple[ndarray, nd
 def _strength(smooth: ndarray) -> ndarray:
     """Minus the determinant of the second derivatives, 0 where it is none of a saddle."""
     across, upright, mixed = (
-        cv2.Sobel(smooth, cv2.CV_32F, *orders, ksize=3, dst=MEMORY.of(str(orders), smooth.shape))
+        cv2.Sobel(smooth, cv2.CV_32F, *orders, ksize=3, dst=ARRAYS.of(str(orders), smooth.shape))
         for orders in ((2, 0), (0, 2), (1, 1))
     )
     cv2.multiply(across, upright, dst=across)
@@ -117,9 +117,9 @@ def _peaks(strength: ndarray) -> tuple[ndarray, ndarray]:
     if min(strength.shape) <= 2 * reach:
         return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
     least = LEAST_STRENGTH_SHARE**2 * float(strength.max())
-    largest = cv2.dilate(strength, np.ones((7, 7), np.uint8), dst=MEMORY.of("largest", strength.shape))
-    peak = np.greater_equal(strength, largest, out=MEMORY.of("peak", strength.shape, bool))
-    peak &= np.greater(strength, least, out=MEMORY.of("strong", strength.shape, bool))
+    largest = cv2.dilate(strength, np.ones((7, 7), np.uint8), dst=ARRAYS.of("largest", strength.shape))
+    peak = np.greater_equal(strength, largest, out=ARRAYS.of("peak", strength.shape, bool))
+    peak &= np.greater(strength, least, out=ARRAYS.of("strong", strength.shape, bool))
     y, x = np.divmod(np.flatnonzero(peak), strength.shape[1])
     height, width = strength.shape
     inside = (x >= reach) & (x < width - reach) & (y >= reach) & (y < height - reach)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.memory import Memory
+from orthoscope.detection.reused_arrays import ReusedArrays
 from orthoscope.geometry.arrays import Float, Int, ndarray
 
 __all__ = ["ARM_COUNT", "COLUMN_COUNT", "Shapes", "Windows"]
@@ -62,7 +62,7 @@ class Windows:
         start: (n,2) where the corners are to a few pixels.
         along, down: (n,2) from a corner to the sides of its window.
         arms: (n,) how far from the edges the window's corners are left out, as a share of it.
-        memory: that no other windows use as long as these are needed.
+        arrays: that no other windows use as long as these are needed.
         level: (n,) mean grey, which the sums do without.
     """
 
@@ -73,10 +73,10 @@ class Windows:
         along: Float[ndarray, "n 2"],
         down: Float[ndarray, "n 2"],
         arms: Float[ndarray, " n"],
-        memory: Memory,
+        arrays: ReusedArrays,
     ) -> None:
         height, width = grey.shape
-        self._memory = memory
+        self._arrays = arrays
         self._middle = np.clip(np.rint(start).astype(int), 0, (width - 1, height - 1))
         self._to_window = _inverses(along, down)
         self._arms = arms[:, None].astype(np.float32)
@@ -84,10 +84,10 @@ class Windows:
         x, y = _reached(self._to_window, reach)
         first = self._middle[:, 1] * width + self._middle[:, 0]
         shape = (len(start), len(x))
-        places = np.add(first[:, None], y * width + x, out=memory.of("places", shape, np.intp))
-        seen = grey.ravel().take(places, mode="clip", out=memory.of("seen", shape, grey.dtype))
+        places = np.add(first[:, None], y * width + x, out=arrays.of("places", shape, np.intp))
+        seen = grey.ravel().take(places, mode="clip", out=arrays.of("seen", shape, grey.dtype))
         self.level = seen.mean(1, dtype=np.float32)
-        self._pixels = np.subtract(seen, self.level[:, None], out=memory.of("pixels", shape))
+        self._pixels = np.subtract(seen, self.level[:, None], out=arrays.of("pixels", shape))
         self._inside = np.ones((len(start), 1), dtype=np.float32)
         if (self._middle < reach).any() or (self._middle >= (width - reach, height - reach)).any():
             column, row = self._middle[:, :1] + x, self._middle[:, 1:] + y
@@ -99,7 +99,7 @@ class Windows:
         saddles.
         """
         a1, a2, d1, d2, u, v = self._distances(which, shapes)
-        columns = self._memory.of("columns", (len(which), COLUMN_COUNT + 1, d1.shape[1]))
+        columns = self._arrays.of("columns", (len(which), COLUMN_COUNT + 1, d1.shape[1]))
         f1, f2, f1_a1, f2_a2, blurring, saddle, one, across, upright, picture = columns.transpose(1, 0, 2)
         np.multiply(_root_weights(u, v, self._arms[which]), self._inside[which], out=one)
         e1, e2 = np.tanh(d1), np.tanh(d2)
@@ -144,7 +144,7 @@ class Windows:
         forms[:4, :, :2] = np.array([[c1, s1], [c2, s2], [-s1, c1], [s2, -c2]]).transpose(0, 2, 1)
         forms[4:, :, :2] = self._to_window[:, which]
         forms[:, :, 2] = -(forms[:, :, :2] * (shapes.places - self._middle[which])).sum(-1)
-        out = self._memory.of("distances", (6, len(which), self._offsets.shape[1]))
+        out = self._arrays.of("distances", (6, len(which), self._offsets.shape[1]))
         np.matmul(forms.astype(np.float32), self._offsets, out=out)
         bend1, bend2 = (0.5 * shapes.blur * shapes.bends.T)[:, :, None].astype(np.float32)
         out[2] -= bend1 * out[0] * out[0]

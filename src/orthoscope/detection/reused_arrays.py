@@ -12,13 +12,13 @@ import numpy as np
 
 from orthoscope.geometry.arrays import ndarray
 
-__all__ = ["Memory"]
+__all__ = ["ReusedArrays"]
 
 # Larger arrays, bytes, are new ones each time, so that little is kept.
 MOST_BYTES = 2**23
 
 
-class Memory(threading.local):
+class ReusedArrays(threading.local):
     """Arrays by name, each thread's its own; the next one of a name takes the place of the last."""
 
     def __init__(self) -> None:
