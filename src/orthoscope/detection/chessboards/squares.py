@@ -20,6 +20,9 @@ LEAST_PLAIN_SHARE = 0.37
 LEAST_PLAIN_SQUARES_SHARE = 0.5
 # A strip's contrast is below that of a square where it is by so many standard errors.
 SURE_ERRORS = 3.0
+# Where a line's step differs from the next by less than this share of the shorter side of a square it may be
+# tilt, or the lens.
+MOST_KINK = 0.6
 # In the four squares around a corner the grey is looked at so far from their sides, squares.
 STEPS_INTO_SQUARE = (0.15, 0.25, 0.35)
 # Weights (3, 36) of the corner, its step along the row and its step along the column: nine places in each of
@@ -42,7 +45,8 @@ def plain_part(
     Where a board is seen small and slanted a lattice may link every other corner, or middles of squares: its
     own squares are then parts of several, at some of nine places in them. Or links leap from a corner to one
     that is a square farther to the side: on both sides of such a fault, a strip of squares from side to side
-    that are not plain, the lattice is right, but its lines do not belong together.
+    that are not plain, or at which all lines kink, the lattice is right, but its lines do not belong
+    together.
 
     Args:
         grey: (h,w) uint8.
@@ -64,7 +68,8 @@ def plain_part(
     for axis in (0, 1):
         known, right = whole.sum(1 - axis), plain.sum(1 - axis)
         patchy = _patchy_strips(values, whole & colours, whole & ~colours, axis)
-        faults = np.flatnonzero((known > 0) & (right <= LEAST_PLAIN_SQUARES_SHARE * known) | patchy) + 1
+        faulty = (known > 0) & (right <= LEAST_PLAIN_SQUARES_SHARE * known) | patchy
+        faults = np.flatnonzero(faulty | _beside_kinks(grid, seen, axis)) + 1
         if len(faults):
             ends, lines = [0, *faults.tolist(), seen.shape[axis]], seen.sum(1 - axis)
             most = max((slice(*part) for part in pairwise(ends)), key=lambda part: lines[part].sum())
@@ -92,6 +97,26 @@ def _patchy_strips(
     contrast = bright - black
     above = contrast + SURE_ERRORS * np.sqrt(error**2 + black_error**2)
     return (above < LEAST_PLAIN_SHARE * contrast.max(0)).any(0)
+
+
+def _beside_kinks(
+    grid: Float[ndarray, "r c 2"], seen: Bool[ndarray, "r c"], axis: int
+) -> Bool[ndarray, " k"]:
+    """Which strips of squares are on either side of a line at which those that cross it kink: one of the two
+    is a fault.
+    """
+    lines = np.where(seen[..., None], grid, np.nan)
+    lines = lines.transpose(1, 0, 2) if axis else lines  # one after the other now
+    beside = np.zeros(len(lines) - 1, dtype=bool)
+    steps = np.diff(lines, axis=0)
+    kinks, lengths = np.linalg.norm(np.diff(steps, axis=0), axis=-1), np.linalg.norm(steps, axis=-1)
+    along = np.linalg.norm(np.diff(lines[1:-1], axis=1), axis=-1)
+    for line, (kink, *beyond, side) in enumerate(zip(kinks, lengths[:-1], lengths[1:], along, strict=True)):
+        known = np.isfinite(kink)
+        if known.sum() > 1 and np.isfinite(side).any():
+            least = np.minimum(np.minimum(*beyond)[known], median(side[np.isfinite(side)]))
+            beside[line : line + 2] |= median(kink[known] / np.maximum(least, 1e-9)) > MOST_KINK
+    return beside
 
 
 def _means_of_strips(

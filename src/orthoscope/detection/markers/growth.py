@@ -12,10 +12,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from orthoscope.detection.chessboards.grid import cross, grid_shape, nearest_neighbour
+from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
 from orthoscope.detection.markers.foreseen import are_off, next_corners
 from orthoscope.detection.saddles.linked import are_linked
-from orthoscope.detection.saddles.refine import WIDEST_SPREAD, WINDOW_SHARE, Refined, refined, sought_again
+from orthoscope.detection.saddles.refine import Refined, refined, sought_again
 from orthoscope.detection.sight import Sight
 from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 
@@ -32,12 +32,6 @@ MOST_TRIES, MOVED_SHARE = 3, 0.12
 FARTHEST_SHARE, LEAST_STEP_PX = 0.4, 10.0
 # What is seen roughly is where others foresee it to this share of a step.
 ROUGHLY_SHARE = 0.15
-# A saddle's fit has so many unknowns; a window with less than so many times as many pixels is small.
-SADDLE_UNKNOWNS, PIXELS_OF_SMALL = 9, 3.0
-# In a window with fewer pixels than this a corner is not told from the next one.
-FEWEST_PIXELS = 6.0
-# In a small window blur may be taken for contrast: it has less than so many times the usual.
-MOST_CONTRAST_RATIO = 2.0
 # A corner that is sure moves by less than this, pixels, when it is fitted once more.
 STEADY_PX = 0.5
 # A sight of a board has at least this many corners.
@@ -119,7 +113,6 @@ def grown_from(
     fine, good = _once_more(grey, fine, good, board)
     pixels = np.where(good[:, None], fine.pixels, np.nan)
     sure = good & fine.sure & fine.whole & (np.hypot(*(fine.pixels - before).T) < STEADY_PX)
-    sure[sure] = _have_pixels_enough(fine.of(sure), places[sure])
     return Grown(pixels, sure, missing <= MOST_MISSING_SHARE * good.sum())
 
 
@@ -145,19 +138,6 @@ def _once_more(
     good = good.copy()
     good[ids] = _fit(again, start, ids, board)
     return fine.with_others(ids, again), good
-
-
-def _have_pixels_enough(fine: Refined, places: Float[ndarray, "k 2"]) -> Bool[ndarray, " k"]:
-    """Which corners are sure though a small window has hardly more pixels than a saddle has unknowns: what
-    these leave is then less than there is noise, and the spread by it too small.
-    """
-    shape = grid_shape(fine.pixels, places)
-    pixels = (2.0 * WINDOW_SHARE) ** 2 * np.abs(cross(shape.along, shape.down))
-    small, contrast = pixels < PIXELS_OF_SMALL * SADDLE_UNKNOWNS, np.abs(fine.contrast)
-    spread = np.where(small, np.maximum(fine.spread, median(fine.spread)), fine.spread)
-    spread = spread * np.sqrt(pixels / np.maximum(pixels - SADDLE_UNKNOWNS, 1.0))
-    usual = contrast < MOST_CONTRAST_RATIO * median(contrast)
-    return (spread < WIDEST_SPREAD) & (usual | ~small) & (pixels > FEWEST_PIXELS)
 
 
 def _fit(

@@ -52,7 +52,7 @@ LEAST_CONTRAST = 1.0
 FEWEST_PIXELS = 60
 # Of a marker of the picture's own width a lens bends the sides by about this share of it: by terms of second
 # order, and of third.
-USUAL_BENDS = (0.25, 0.25)
+USUAL_BENDS = (0.4, 0.4)
 # These are powers of x and y in the polynomial.
 POWERS = np.array([(i - j, j) for i in range(4) for j in range(i + 1)])
 # So many of them move and stretch.

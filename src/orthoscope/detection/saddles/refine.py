@@ -73,7 +73,7 @@ class Usual(NamedTuple):
 
     Attributes:
         shrink: how many of the photograph's pixels are one of the picture that was fitted.
-        noise: variance of that picture's noise.
+        noise: variance of that picture's noise, once it is smoothed.
         blur: of the saddles, its pixels.
         contrast: of the saddles, grey levels.
         left: share of a window's variance that is neither saddle nor noise.
@@ -207,13 +207,20 @@ def _refined(
     along, down = _window(shape.along), _window(shape.down)
     bends, arms = np.stack([shape.bend_along, shape.bend_down], axis=1), _arms(shape, arm)
     smooth = cv2.GaussianBlur(small, (0, 0), SMOOTHING_SIGMA)
+    noise = usual.noise if usual else NOISE_LEFT_SHARE * _noise_of(grey, small, shrink)
     saddles = fit_saddles(
-        smooth, near, along, down, bends=bends, arms=arms, usual_blur=usual.blur if usual else None
+        smooth,
+        near,
+        along,
+        down,
+        bends=bends,
+        arms=arms,
+        noise=noise,
+        usual=(usual.blur, usual.contrast) if usual else None,
     )
     allowed = np.maximum(FARTHEST_SHARE * step, 1.0)
     signal = SADDLE_MEAN_SQUARE * saddles.contrast**2
-    noise = usual.noise if usual else noise_variance(small)
-    noise_share = NOISE_LEFT_SHARE * noise / np.maximum(signal + NOISE_LEFT_SHARE * noise, 1e-9)
+    noise_share = noise / np.maximum(signal + noise, 1e-9)
     least = LEAST_SADDLE_SHARE * (1.0 - noise_share)
     believed = (np.hypot(*(saddles.places - near).T) < allowed) & (saddles.explained > least)
     sure = believed & (saddles.spread * shrink < WIDEST_SPREAD)
@@ -233,7 +240,13 @@ def _refined(
     if len(doubtful):
         few = Saddles(*(part[doubtful] for part in saddles))
         told = saddle_arms(
-            smooth, few, along[doubtful], down[doubtful], bends=bends[doubtful], arms=arms[doubtful]
+            smooth,
+            few,
+            along[doubtful],
+            down[doubtful],
+            bends=bends[doubtful],
+            arms=arms[doubtful],
+            noise=noise,
         )
         most_left = np.where(arms < 1.0, MOST_UNEXPLAINED_BY_MARKS, MOST_UNEXPLAINED)
         little = left < most_left + MOST_UNEXPLAINED_NOISE * noise_share
@@ -246,6 +259,13 @@ def _refined(
     )
     spread = saddles.spread * shrink
     return Refined(pixels, believed, saddles.explained, sure, whole, spread, plain, saddles.contrast, usual)
+
+
+def _noise_of(grey: ndarray, small: ndarray, shrink: int) -> float:
+    """The variance of a reduced part's noise: small squares have few even parts, the whole picture may have
+    none.
+    """
+    return min(noise_variance(small), noise_variance(grey) / shrink**2)
 
 
 def _have_whole_arms(told: SaddleArms, little: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:

@@ -54,6 +54,9 @@ DAMPING = np.array([1e-3] * 5 + [1e-6] * 2 + [0.03] * 2)
 # Light makes a window's side usually brighter than its middle by this share of the contrast; where noise is
 # strong, more than that is taken for noise.
 USUAL_LIGHT = 0.02
+# Contrast and blur of a saddle differ from the usual by about these shares, and its edges from the lattice's
+# lines by about so many radians; what noise hides is taken for usual.
+USUAL_CONTRAST_SPREAD, USUAL_BLUR_SPREAD, USUAL_TURN = 0.3, 0.3, 0.15
 # So many pixels of all windows are done together, so that the arrays stay in cache.
 PIXELS_AT_ONCE = 80_000
 # Of the windows of one batch, whose next begins when it is done.
@@ -88,7 +91,8 @@ def fit_saddles(
     *,
     bends: Float[ndarray, "n 2"],
     arms: Float[ndarray, " n"] | None = None,
-    usual_blur: float | None = None,
+    noise: float = 0.0,
+    usual: tuple[float, float] | None = None,
 ) -> Saddles:
     """The saddles near `start`.
 
@@ -100,30 +104,44 @@ def fit_saddles(
         bends: curvature of the two edges, 1/px.
         arms: (n,) how far from the edges, as a share of the window, its corners are left out, where something
             else is printed.
-        usual_blur: of the picture's saddles, where it is known; a few of these tell it otherwise.
+        noise: variance of the picture's, grey levels squared: a window of a few pixels, which the saddle
+            follows wherever they go, leaves less than there is.
+        usual: blur, pixels, and contrast, grey levels, of the picture's saddles, where they are known; these
+            tell them otherwise.
     """
-    fit = _Fit(grey, start, along, down, bends, np.ones(len(start)) if arms is None else arms)
-    if usual_blur is None:
+    fit = _Fit(grey, start, along, down, bends, np.ones(len(start)) if arms is None else arms, noise)
+    if usual is None:
         fit.begin_with_one_blur()
     else:
-        fit.shapes.blur[:] = usual_blur
+        fit.shapes.blur[:] = usual[0]
+        fit.usual = usual
     for share, still in STAGES:
         fit.settle(fit.by_size, share, still)
+        fit.usual = usual or (median(fit.shapes.blur), median(np.abs(fit.contrast)))
     shapes = fit.shapes
-    return Saddles(
-        shapes.places, shapes.angles, shapes.blur, fit.contrast, fit.explained, fit.spread(usual_blur)
-    )
+    return Saddles(shapes.places, shapes.angles, shapes.blur, fit.contrast, fit.explained, fit.spread())
 
 
 class _Fit:
-    """All corners of a picture on their way; by_size: their order, windows of one size together."""
+    """All corners of a picture on their way; by_size: their order, windows of one size together; usual: blur
+    and contrast of most, once they are known.
+    """
 
     def __init__(
-        self, grey: ndarray, start: ndarray, along: ndarray, down: ndarray, bends: ndarray, arms: ndarray
+        self,
+        grey: ndarray,
+        start: ndarray,
+        along: ndarray,
+        down: ndarray,
+        bends: ndarray,
+        arms: ndarray,
+        noise: float,
     ) -> None:
-        self.arms = arms
+        self.arms, self.least_noise = arms, noise
+        self.usual: tuple[float, float] | None = None
         self.grey, self.along, self.down = grey, along, down
         angles = np.stack([np.arctan2(along[:, 1], along[:, 0]), np.arctan2(down[:, 1], down[:, 0])], axis=1)
+        self.lines = angles.copy()
         self.shapes = Shapes(start.astype(float), angles, np.ones(len(start)), bends, np.zeros(len(start)))
         self.contrast, self.explained = np.zeros((2, len(start)))
         self.sums = np.zeros((len(start), COLUMN_COUNT + 1, COLUMN_COUNT + 1))
@@ -170,7 +188,8 @@ class _Fit:
         """One step of these corners; how far each moved, px."""
         shapes = self.shapes
         self.sums[here] = sums
-        solution, self.explained[here], self.noise[here] = _solved(sums, self._damping(here, sums))
+        damping, towards = self._held(here, sums)
+        solution, self.explained[here], self.noise[here] = _solved(sums, damping, towards)
         contrast = self.contrast[here] = solution[:, 5]
         step = in_pixels(
             solution[:, :5] / np.where(np.abs(contrast) < 1e-9, 1e-9, contrast)[:, None], shapes.of(here)
@@ -182,23 +201,40 @@ class _Fit:
         shapes.relief[here] = np.clip(contrast / np.maximum(level + solution[:, 6], 1.0), -1.0, 1.0)
         return np.abs(step[:, :2]).max(1)
 
-    def _damping(self, here: ndarray, sums: Float[ndarray, "n 10 10"]) -> Float[ndarray, "n 9"]:
-        """What is added to the diagonal of the sums: of the light, what noise makes of a window is not
-        believed to be light beyond `USUAL_LIGHT`.
+    def _held(
+        self, here: ndarray, sums: Float[ndarray, "n 10 10"]
+    ) -> tuple[Float[ndarray, "n 9"], Float[ndarray, "n 9"]]:
+        """What is added to the diagonal of the sums and to their right side: what noise makes of a window is
+        not believed to be light beyond `USUAL_LIGHT`, nor contrast and blur that are not usual.
         """
         damping = DAMPING * np.einsum("npp->np", sums[:, :-1, :-1]) + 1e-6
-        light = USUAL_LIGHT * np.abs(self.contrast[here]) / self.half[here]
+        towards = np.zeros_like(damping)
+        contrast = self.contrast[here]
+        light = USUAL_LIGHT * np.abs(contrast) / self.half[here]
         damping[:, 7:] += (self.noise[here] / np.maximum(light**2, 1e-9))[:, None]
-        return damping
+        if self.usual:
+            blur, usual = self.usual
+            noise, signed = np.maximum(self.noise[here], self.least_noise), np.copysign(usual, contrast)
+            of_blur = noise / max(USUAL_BLUR_SPREAD * usual, 1e-9) ** 2
+            of_contrast = noise / max(USUAL_CONTRAST_SPREAD * usual, 1e-9) ** 2
+            of_turn = noise / max(USUAL_TURN * usual, 1e-9) ** 2
+            turned = self.shapes.angles[here] - self.lines[here]
+            damping[:, 2:4] += of_turn[:, None]
+            towards[:, 2:4] = (of_turn * contrast)[:, None] * turned * [1.0, -1.0]
+            damping[:, 4] += of_blur
+            damping[:, 5] += of_contrast
+            towards[:, 4] = of_blur * contrast * np.log(self.shapes.blur[here] / blur)
+            towards[:, 5] = of_contrast * signed
+        return damping, towards
 
-    def spread(self, usual_blur: float | None) -> Float[ndarray, " n"]:
+    def spread(self) -> Float[ndarray, " n"]:
         """The standard deviation of each corner in its worst direction, pixels, from the last step's sums."""
         every = np.arange(len(self.contrast))
-        damped = self.sums[:, :-1, :-1] + np.eye(COLUMN_COUNT) * self._damping(every, self.sums)[:, None]
-        scale = self.noise / np.maximum(self.contrast**2, 1e-9)
+        damped = self.sums[:, :-1, :-1] + np.eye(COLUMN_COUNT) * self._held(every, self.sums)[0][:, None]
+        scale = np.maximum(self.noise, self.least_noise) / np.maximum(self.contrast**2, 1e-9)
         of_columns = np.linalg.solve(damped, np.eye(COLUMN_COUNT)[:, :2])[:, :2] * scale[:, None, None]
-        least = median(self.shapes.blur) if usual_blur is None else usual_blur
-        blur, bends = np.maximum(self.shapes.blur, least), self.shapes.bends
+        blur = np.maximum(self.shapes.blur, self.usual[0] if self.usual else 0.0)
+        bends = self.shapes.bends
         shapes = Shapes(self.shapes.places, self.shapes.angles, blur, bends, self.shapes.relief)
         units = np.broadcast_to(np.eye(5)[:2], (len(blur), 2, 5))
         turned = np.stack([in_pixels(units[:, i], shapes)[:, :2] for i in (0, 1)], axis=2)
@@ -207,13 +243,14 @@ class _Fit:
 
 
 def _solved(
-    sums: Float[ndarray, "n 10 10"], damping: Float[ndarray, "n 9"]
+    sums: Float[ndarray, "n 10 10"], damping: Float[ndarray, "n 9"], towards: Float[ndarray, "n 9"]
 ) -> tuple[Float[ndarray, "n 9"], Float[ndarray, " n"], Float[ndarray, " n"]]:
     """The damped least squares solution in each window, the share of its variance that this explains, and
     the variance that it leaves.
     """
     normal, right, square = sums[:, :-1, :-1], sums[:, :-1, -1], sums[:, -1, -1]
-    solution = np.linalg.solve(normal + np.eye(COLUMN_COUNT) * damping[:, None], right[:, :, None])[:, :, 0]
+    damped = normal + np.eye(COLUMN_COUNT) * damping[:, None]
+    solution = np.linalg.solve(damped, (right + towards)[:, :, None])[:, :, 0]
     left = square - (solution * (2.0 * right - (normal @ solution[:, :, None])[:, :, 0])).sum(1)
     weight = np.maximum(normal[:, 6, 6], 1e-9)
     variance = square - right[:, 6] ** 2 / weight

@@ -79,6 +79,7 @@ def saddle_arms(
     *,
     bends: Float[ndarray, "n 2"],
     arms: Float[ndarray, " n"],
+    noise: float,
 ) -> SaddleArms:
     """What each arm of the saddles says.
 
@@ -87,6 +88,7 @@ def saddle_arms(
         along, down: from a corner to the sides of its window, pixels.
         bends: curvature of the two edges, 1/px.
         arms: (n,) how far from the edges, as a share of the window, its corners are left out.
+        noise: variance of the picture's, grey levels squared, the least that a window is believed to have.
     """
     shapes = Shapes(saddles.places.copy(), saddles.angles.copy(), saddles.blur, bends, np.zeros(len(arms)))
     half = np.sqrt(np.maximum((along**2).sum(1), (down**2).sum(1)))
@@ -100,7 +102,7 @@ def saddle_arms(
         for step in range(STEPS):
             sums = windows.arm_sums(every, shapes.of(some))
             if not step:
-                shifts[some], spread[some], steps[some] = _arms_moved(sums, contrast, light[some])
+                shifts[some], spread[some], steps[some] = _arms_moved(sums, contrast, light[some], noise)
             moved = in_pixels(_edges_moved(sums, contrast, light[some]), shapes.of(some))
             moved = np.clip(moved, -LARGEST_STEP, LARGEST_STEP)
             shapes.places[some] += moved[:, :2]
@@ -127,14 +129,15 @@ def _edges_moved(
 
 
 def _arms_moved(
-    sums: Float[ndarray, "n 16 16"], contrast: Float[ndarray, " n"], light: Float[ndarray, " n"]
+    sums: Float[ndarray, "n 16 16"], contrast: Float[ndarray, " n"], light: Float[ndarray, " n"], least: float
 ) -> tuple[Float[ndarray, "n 4"], Float[ndarray, "n 4"], Float[ndarray, "n 4"]]:
     """Shifts of arms, in blurs, their standard deviations and the steps across them as shares."""
     solution, inverse, noise = _solved(sums, DAMPING, light)
     shares, steps = _half_steps(solution, contrast)
     arms = slice(4, 4 + ARM_COUNT)
     normal = sums[:, :-1, :-1]
-    variances = np.einsum("npq,nqr,nrp->np", inverse, normal, inverse)[:, arms] * noise[:, None]
+    variances = np.einsum("npq,nqr,nrp->np", inverse, normal, inverse)[:, arms]
+    variances *= np.maximum(noise, least)[:, None]
     return solution[:, arms] / steps, np.sqrt(np.maximum(variances, 0.0)) / np.abs(steps), shares
 
 
