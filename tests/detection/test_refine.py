@@ -82,7 +82,7 @@ WINDOW = {"along": np.array([[12.0, 1.0]]), "down": np.array([[-1.0, 12.0]]), "b
 def arms_of(grey: np.ndarray):
     """The fitted saddle and what its arms say."""
     saddles = fitted(grey)
-    return saddles, saddle_arms(grey, saddles, **WINDOW, arms=np.ones(1))
+    return saddles, saddle_arms(grey, saddles, **WINDOW, arms=np.ones(1), noise=0.0)
 
 
 def test_glare_in_a_square_moves_no_arm_and_the_corner_less_where_squares_need_not_be_alike():

@@ -42,17 +42,19 @@ SAMPLES_PER_MODULE = 6.0
 MOST_SAMPLES = 4
 # The blur from which all begin, and the least and most, pixels.
 FIRST_BLUR, LEAST_BLUR, MOST_BLUR = 0.8, 0.1, 6.0
-# A marker has at most so many steps, and has arrived when its corners move by less than this, pixels.
-MOST_STEPS, STILL_PX = 8, 0.05
-# When they have moved by more than this, pixels, they take the place of those from which it began.
-FARTHEST_PX = 0.3
+# A marker has at most so many steps, and has arrived when its corners move by less than this, pixels; after
+# the last by less than the second.
+MOST_STEPS, STILL_PX, NEARLY_STILL_PX = 10, 0.05, 0.2
+# When they have moved by more than this, pixels, they take the place of those from which it began, in the
+# first so many steps: a bend that is begun anew with each step arrives nowhere.
+FARTHEST_PX, BEGINNING_STEPS = 0.3, 4
 # Less contrast than this, grey levels, is none.
 LEAST_CONTRAST = 1.0
 # A marker with fewer pixels tells nothing.
 FEWEST_PIXELS = 60
 # Of a marker of the picture's own width a lens bends the sides by about this share of it: by terms of second
 # order, and of third.
-USUAL_BENDS = (0.4, 0.4)
+USUAL_BENDS = (0.25, 0.25)
 # These are powers of x and y in the polynomial.
 POWERS = np.array([(i - j, j) for i in range(4) for j in range(i + 1)])
 # So many of them move and stretch.
@@ -163,18 +165,21 @@ class _Fit:
         self._usual_bends = np.tile(np.concatenate([np.full(STRAIGHT, np.inf), bends]), 2)
 
     def settle(self) -> bool:
-        """Steps until the corners stay; whether there is anything to tell them."""
+        """Steps until the corners stay; whether they do, nearly."""
         if not self.is_in_picture or len(self._values) < FEWEST_PIXELS:
             return False
-        for _ in range(MOST_STEPS):
+        moved = np.inf
+        for number in range(MOST_STEPS):
             before = self.corners
             if not self._step():
                 return False
-            if np.abs(self.corners - before).max() < STILL_PX:
+            moved = np.abs(self.corners - before).max()
+            if moved < STILL_PX:
                 break
-            if np.abs(self.corners - self.start).max() > FARTHEST_PX:  # the bend is told from better corners
+            far = np.abs(self.corners - self.start).max() > FARTHEST_PX
+            if far and number < BEGINNING_STEPS:  # the bend is told from better corners
                 self.start, self._moved = self.corners, np.zeros_like(self._moved)
-        return True
+        return bool(moved < NEARLY_STILL_PX)
 
     def left_near_corners(self) -> Float[ndarray, "4"]:
         """The variance that the drawing leaves near each corner, as a share of the square of the contrast."""
