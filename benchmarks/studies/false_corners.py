@@ -4,6 +4,7 @@
     python -m benchmarks.studies.false_corners --count 10000 --seed 1    others, and more of them
     python -m benchmarks.studies.false_corners --verbose                 a line for each false corner
     python -m benchmarks.studies.false_corners --only circles            those of some boards
+    python -m benchmarks.studies.false_corners --other-boards            boards of other sizes and kinds
     python -m benchmarks.studies.false_corners --log seen.jsonl          what was seen is kept
 
 Photographs are 640x480, by a lens `brown` and a fisheye in turn; sharp, usual and poor ones (`QUALITIES`);
@@ -55,6 +56,20 @@ BOARDS = (
     "circles:4x11:20mm:asymmetric",
     "circles:9x7:20mm:symmetric:10mm",
 )
+OTHER_BOARDS = (
+    "chessboard:10x7:25mm",
+    "chessboard:7x7:30mm",
+    "chessboard:5x4:40mm",
+    "marked:11x8:20mm:DICT_5X5_100:14mm",
+    "charuco:9x6:30mm:22mm:DICT_6X6_250",
+    "charuco:5x8:40mm:30mm:DICT_ARUCO_ORIGINAL:legacy",
+    "charuco:12x9:20mm:15mm:DICT_5X5_250",
+    "aprilgrid:8x5:40mm:0.3",
+    "aprilgrid:5x7:60mm:0.2",
+    "aruco:4x6:50mm:15mm:DICT_6X6_50",
+    "circles:5x9:20mm:asymmetric",
+    "circles:7x6:25mm:symmetric:9mm",
+)
 CAMERAS = (
     Camera((640, 480), Intrinsics(560.0, 559.0, 323.0, 237.0), Brown(k1=-0.22, k2=0.06)),
     Camera((640, 480), Intrinsics(260.0, 260.0, 319.0, 241.0), KannalaBrandt(k1=-0.02)),
@@ -101,16 +116,18 @@ def _target(spec: str) -> Target:
     return parse_target(spec)
 
 
-def photographs(count: int, *, seed: int = 0, first: int = 0) -> Iterator[Shown]:
-    """So many photographs; a number's is the same whatever the count."""
+def photographs(
+    count: int, *, seed: int = 0, first: int = 0, boards: tuple[str, ...] = BOARDS
+) -> Iterator[Shown]:
+    """So many photographs of these boards in turn; a number's is the same whatever the count."""
     for number in range(first, first + count):
-        shown = _photograph(number, np.random.default_rng([seed, number]))
+        target = _target(boards[number % len(boards)])
+        shown = _photograph(number, target, np.random.default_rng([seed, number]))
         if shown:
             yield shown
 
 
-def _photograph(number: int, rng: np.random.Generator) -> Shown | None:
-    target = _target(BOARDS[number % len(BOARDS)])
+def _photograph(number: int, target: Target, rng: np.random.Generator) -> Shown | None:
     which, name = int(rng.integers(2)), list(QUALITIES)[int(rng.integers(len(QUALITIES)))]
     quality, camera = QUALITIES[name], CAMERAS[which]
     blur, noise = float(rng.choice(quality.blurs)), float(rng.uniform(*quality.noise))
@@ -262,6 +279,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the number of the first")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="of boards whose description begins so")
+    parser.add_argument("--other-boards", action="store_true", help="boards of other sizes and kinds")
     parser.add_argument("--log", type=Path, help="a line of JSON for each photograph")
     parser.add_argument(
         "--verbose", action="store_true", help="a line for each photograph with false corners"
@@ -283,25 +301,30 @@ def main() -> None:
         " false corners, in photographs | ids wrong | time |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
-    for name in [*(f"`{_target(spec).name}`" for spec in BOARDS), *QUALITIES, "all"]:
+    for name in [*(f"`{_target(spec).name}`" for spec in _boards(given)), *QUALITIES, "all"]:
         if name in tallies:
             print(tallies[name].row(name))
 
 
+def _boards(given: argparse.Namespace) -> tuple[str, ...]:
+    """Those that are asked for."""
+    return OTHER_BOARDS if given.other_boards else BOARDS
+
+
 def _outcomes(given: argparse.Namespace) -> Iterator[Outcome]:
     """Of all photographs that are asked for; those that the log has from there."""
-    known = {}
+    known, boards = {}, _boards(given)
     if given.log and given.log.exists():
         lines = given.log.read_text(encoding="utf-8").splitlines()
         known = {one.number: one for one in (Outcome(*json.loads(line)) for line in lines)}
     log = given.log.open("a", encoding="utf-8") if given.log else nullcontext()
     with log as file:
         for number in range(given.first, given.first + given.count):
-            if not BOARDS[number % len(BOARDS)].startswith(given.only):
+            if not boards[number % len(boards)].startswith(given.only):
                 continue
             one = known.get(number)
             if one is None:
-                for shown in photographs(1, seed=given.seed, first=number):
+                for shown in photographs(1, seed=given.seed, first=number, boards=boards):
                     one = outcome_of(shown)
                 if one and file:
                     print(json.dumps(one), file=file, flush=True)
