@@ -39,6 +39,16 @@ def test_a_corner_that_was_mistaken_is_off_and_no_other(lens, corner):
     np.testing.assert_array_equal(np.flatnonzero(are_off(pixels, PLACES, (480, 640))), [corner])
 
 
+def test_a_doubtful_corner_beside_one_row_and_one_column_is_not_foreseen_and_goes():
+    seen = (COLUMN == 8) | (ROW == 6) | ((COLUMN == 7) & (ROW == 5))
+    pixels, alone = board_by("brown", 0.05), 7 + 9 * 5
+    pixels[alone] += [4.0, 3.0]
+    for doubtful in (False, True):
+        off = are_off(pixels[seen], PLACES[seen], (480, 640), doubtful=np.full(int(seen.sum()), doubtful))
+        assert off[np.flatnonzero(seen) == alone] == doubtful
+        assert off.sum() == doubtful
+
+
 def test_too_few_corners_tell_nothing():
     for few in (0, 1, 3):
         assert not are_off(np.zeros((few, 2)), PLACES[:few], (480, 640)).any()

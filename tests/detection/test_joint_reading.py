@@ -76,6 +76,15 @@ def test_ids_are_known_where_hardly_a_marker_can_be_read(legacy, negative):
     assert np.linalg.norm(sight.pixels - turned, axis=1).max() < 0.3
 
 
+def test_a_corner_too_many_beyond_the_board_does_not_make_one_layout_of_the_other():
+    picture = small_picture(9, 6)  # the old layout has the same markers a column on
+    y, x = (np.array([1, 9]) + 0.5) * SQUARE + 29.5
+    picture[int(y) : int(y) + SQUARE, int(x) : int(x) + SQUARE] = 60  # its corners are two more of a lattice
+    sight = see(picture, target_of(Charuco(9, 6, 0.03, 0.021, NAME)))
+    assert isinstance(sight, Sight)
+    assert np.linalg.norm(sight.pixels - where(9, 6)[sight.ids], axis=1).max() < 0.3
+
+
 @pytest.mark.parametrize("way_up", [0, 2], ids=["OpenCV", "Kalibr"])
 def test_small_tags_are_read_together_whichever_way_up_they_are_printed(way_up):
     board = AprilGrid(5, 4, 0.03, 0.3)

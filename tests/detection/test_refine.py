@@ -58,6 +58,22 @@ def test_a_saddle_is_found_to_a_hundredth_of_a_pixel_whatever_its_look(look):
     assert saddles.explained > 0.97
 
 
+@pytest.mark.parametrize("half", [1.2, 2.0, 4.0, 10.0])
+def test_corners_spread_as_they_say_and_by_less_than_a_pixel_in_windows_of_a_few_pixels(half):
+    rng, count, deviation = np.random.default_rng(0), 8, 3.0
+    plain = np.tile(picture(blur=1.0, contrast=40.0), (count, count)).astype(float)
+    noisy = np.rint(plain + rng.normal(0.0, deviation, plain.shape)).astype(np.uint8)
+    truth = PLACE + 41.0 * lattice(count, count)
+    along, down = (np.tile([[half * x, half * y]], (len(truth), 1)) for x, y in ((1.0, 0.1), (-0.1, 1.0)))
+    bends = np.zeros_like(truth)
+    start = truth + rng.uniform(-0.3, 0.3, truth.shape)
+    saddles = fit_saddles(noisy, start, along, down, bends=bends, noise=deviation**2)
+    error = np.hypot(*(saddles.places - truth).T)
+    assert np.sqrt(0.5 * ((error / saddles.spread) ** 2).mean()) < 1.2
+    assert error[saddles.spread < 0.19].max(initial=0.0) < 0.8
+    assert_allclose(np.abs(saddles.contrast), 40.0, rtol=0.4)
+
+
 @pytest.mark.parametrize("bend", [0.02, -0.02])
 def test_a_bent_edge_moves_the_corner_unless_the_bend_is_known(bend):
     grey = picture(bend=bend)

@@ -33,6 +33,7 @@ __all__ = [
     "placements",
     "without_lost_lines",
     "without_strays",
+    "without_thin_lines",
 ]
 
 # A corner strays from the parabolas of its row and column by at most this share of a step.
@@ -229,6 +230,20 @@ def without_strays(found: CornerLattice) -> CornerLattice | None:
         return None
     cells = found.cells[keep]
     return CornerLattice(found.pixels[keep], cells - cells.min(0), found.bright[keep])
+
+
+def without_thin_lines(found: CornerLattice) -> CornerLattice | None:
+    """The lattice without lines at its rim that have hardly a corner, and may be chance; None where nothing
+    is left.
+    """
+    seen = np.zeros(found.size[::-1], dtype=bool)
+    seen[found.cells[:, 1], found.cells[:, 0]] = True
+    box = _box(seen)
+    if box is None:
+        return None
+    low, high = (np.array([getattr(part, end) for part in box[::-1]]) for end in ("start", "stop"))
+    keep = ((found.cells >= low) & (found.cells < high)).all(1)
+    return CornerLattice(found.pixels[keep], found.cells[keep] - low, found.bright[keep])
 
 
 def on_lines(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"] | None:

@@ -7,7 +7,7 @@ from functools import cache, partial
 import numpy as np
 
 from orthoscope.detection.chessboards.lattices import CornerLattice
-from orthoscope.detection.chessboards.partial_board import filled, without_strays
+from orthoscope.detection.chessboards.partial_board import filled, without_strays, without_thin_lines
 from orthoscope.detection.markers.board_lattices import corners_by_lattice
 from orthoscope.detection.markers.joint_reading import Way, drawings_of, likeliest_way, seen_squares
 from orthoscope.geometry.arrays import Float, Int, ndarray
@@ -30,6 +30,7 @@ def charuco_corners(grey: ndarray, board: Charuco) -> tuple[Float[ndarray, "m 2"
 def _placed(grey: ndarray, board: Charuco, lattice: CornerLattice) -> Float[ndarray, "m 2"] | None:
     """The board's corners as far as a lattice has them; None where it is not the board's."""
     kept = without_strays(lattice)
+    kept = kept and without_thin_lines(kept)  # one beyond the board makes one layout of the other
     if kept is None:
         return None
     columns, rows = kept.size

@@ -41,6 +41,9 @@ MOST_WEIGHT = 0.98
 BENDS = (-0.1, 0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9)
 # What is straightened farther than this is at the horizon.
 LEAST_STRAIGHTENED = 0.05
+# The others do not foresee a corner by which a board's perspective hangs by more than this share: a doubtful
+# one goes.
+MOST_ALONE = 0.85
 # Fewer corners say nothing of each other.
 FEWEST_CORNERS = 8
 # At most this share of the corners is taken out.
@@ -101,6 +104,10 @@ def are_off(
     off = np.zeros(len(pixels), dtype=bool)
     if len(pixels) < FEWEST_CORNERS or not np.ptp(places, axis=0).all():
         return off
+    if doubtful is not None:
+        off = doubtful & (_own_share(places) > MOST_ALONE)
+        if (~off).sum() < FEWEST_CORNERS:
+            return off
     centre, radius = 0.5 * np.array(shape[1::-1]), 0.5 * float(np.hypot(shape[0], shape[1]))
     bent = min(BENDS, key=lambda bend: _bent_apart((pixels - centre) / radius, places, bend))
     while off.sum() <= MOST_OUT_SHARE * len(off):
@@ -115,6 +122,26 @@ def are_off(
             break
         off[np.flatnonzero(~off)[excess.argmax()]] = True
     return off
+
+
+def _own_share(places: Float[ndarray, "m 2"]) -> Float[ndarray, " m"]:
+    """By how much each corner tells by itself where it is, of a plane that is seen from near: 1 beside a row
+    and a column of others.
+    """
+    x, y = _spread_evenly(places)
+    basis = _orthonormal([np.ones_like(x), x, y, x * y])
+    return np.asarray((basis * basis).sum(1))
+
+
+def _orthonormal(terms: list[Float[ndarray, " m"]]) -> Float[ndarray, "m t"]:
+    """A basis of these terms, one after the other; 0 where a term adds nothing to those before it."""
+    basis, triangle = np.linalg.qr(np.stack(terms, axis=1))
+    return np.asarray(basis * (np.abs(np.diag(triangle)) > LEAST_INDEPENDENT * np.sqrt(len(basis))))
+
+
+def _spread_evenly(places: Float[ndarray, "m 2"]) -> Float[ndarray, "2 m"]:
+    """Places from -1 to 1 both ways."""
+    return np.asarray((2.0 * (places - places.min(0)) / np.maximum(np.ptp(places, axis=0), 1e-9) - 1.0).T)
 
 
 def _bent_apart(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], bend: float) -> float:
@@ -138,10 +165,10 @@ def _bent(
 def _excess(rest: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"], least: float) -> Float[ndarray, " m"]:
     """How far each corner is off, over what is allowed there, by what a flat board leaves."""
     orders = [order for order in range(1, MOST_ORDER + 1) if CORNERS_PER_TERM * _count(order) <= len(rest)]
-    x, y = (2.0 * (places - places.min(0)) / np.maximum(np.ptp(places, axis=0), 1e-9) - 1.0).T
-    powers = [x ** (order - i) * y**i for order in range(orders[-1] + 1) for i in range(order + 1)]
-    basis, triangle = np.linalg.qr(np.stack(powers, axis=1))
-    basis = basis * (np.abs(np.diag(triangle)) > LEAST_INDEPENDENT * np.sqrt(len(rest)))
+    x, y = _spread_evenly(places)
+    basis = _orthonormal(
+        [x ** (order - i) * y**i for order in range(orders[-1] + 1) for i in range(order + 1)]
+    )
     off, weights = [], []
     for order in orders:
         some = basis[:, : _count(order)]

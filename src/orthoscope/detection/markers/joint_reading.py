@@ -173,11 +173,10 @@ def likeliest_way(
         np.concatenate([part.ravel() for part in parts]) for parts in zip(*shifts, strict=True)
     )
     for most_over in (0, MOST_OVERHANG):
-        best = _likeliest(*_of_those(sums, counts, over <= most_over), layout_of, bool(most_over))
-        if best is not None and layout_of[best] and not most_over:
-            # one layout may be the other, shifted, but for what a corner too many makes reach over the board
-            over_it = _likeliest(*_of_those(sums, counts, over <= MOST_OVERHANG), layout_of, False)
-            best = best if over_it is not None and layout_of[over_it] else None
+        may_lie = (over <= most_over) & (counts > 0)
+        best = _likeliest(
+            np.where(may_lie, sums, 0.0), np.where(may_lie, counts, 1), layout_of, bool(most_over)
+        )
         if best is not None:
             of_marker, may, numbers, turns, layout = asked[of[best]]
             shift = np.unravel_index(best - int(np.argmax(of == of[best])), shifts[of[best]].sums.shape)
@@ -185,14 +184,6 @@ def likeliest_way(
             agrees = np.rot90(_locally(of_marker, may, numbers, first), -turns)
             return Way(turns, *first, layout, float(sums[best] / np.sqrt(counts[best])), agrees)
     return None
-
-
-def _of_those(
-    sums: Float[ndarray, " w"], counts: Int[ndarray, " w"], which: Bool[ndarray, " w"]
-) -> tuple[Float[ndarray, " w"], Int[ndarray, " w"]]:
-    """Sums and counts of the ways that may be, of others as if they were nothing."""
-    may_be = which & (counts > 0)
-    return np.where(may_be, sums, 0.0), np.where(may_be, counts, 1)
 
 
 def _likeliest(
