@@ -12,6 +12,7 @@ import numpy as np
 from orthoscope.detection.markers.aprilgrid_lattice import WAYS_UP, aprilgrid_corners
 from orthoscope.detection.markers.growth import CornersOfBoard, grown_from, grown_with, sight_of
 from orthoscope.detection.markers.markers import Markers, find_markers, homography_of, of_one_board, remark_on
+from orthoscope.detection.markers.tag_sides import TagSides
 from orthoscope.detection.sight import Sight, Unseen
 from orthoscope.geometry.arrays import Float, ndarray
 from orthoscope.targets.aprilgrid import BORDER_SQUARES, DICTIONARY, TAG_SQUARES, AprilGrid
@@ -39,7 +40,8 @@ def see_aprilgrid(grey: ndarray, board: AprilGrid) -> Sight | Unseen:
     together, twice = aprilgrid_corners(grey, board)
     places, arm = board.places() * [1.0, -1.0], BORDER_SQUARES / TAG_SQUARES / board.spacing
     cells = np.stack(np.divmod(np.arange(len(places)), board.grid[0])[::-1], axis=1)
-    corners = CornersOfBoard(places, cells, arm, REACH_SHARE / board.spacing)
+    tags = TagSides(np.where(cells % 2, -1, 1) * [1, -1], board.spacing)  # rows go upwards
+    corners = CornersOfBoard(places, cells, arm, REACH_SHARE / board.spacing, tags)
     seen = None if together is None else grown_from(grey, together, corners)
     if seen and seen.is_complete and (sight := sight_of(seen, corners, grey.shape, twice)):
         return sight

@@ -14,6 +14,7 @@ import numpy as np
 
 from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
 from orthoscope.detection.markers.foreseen import are_off, next_corners
+from orthoscope.detection.markers.tag_sides import TagSides, are_at_tags
 from orthoscope.detection.saddles.linked import are_linked
 from orthoscope.detection.saddles.refine import Refined, refined, sought_again
 from orthoscope.detection.sight import Sight
@@ -50,12 +51,14 @@ class CornersOfBoard(NamedTuple):
         cells: (m,2) column and row of each.
         arm: how far from a corner's edges something else than squares is printed, in steps.
         reach: how far from a corner those are that it foresees, in steps.
+        tags: on which side of each a tag is, where it is one's corner.
     """
 
     places: Float[ndarray, "m 2"]
     cells: Int[ndarray, "m 2"]
     arm: float
     reach: float
+    tags: TagSides | None = None
 
 
 class Grown(NamedTuple):
@@ -99,7 +102,7 @@ def grown_from(
         else:
             some = sought_again(grey, fine.of(ids), start[ids], places[ids], new[ids], arm=board.arm)
             fine = fine.with_others(ids, some)
-        good[ids] = _fit(some, start[ids], ids, board)
+        good[ids] = _fit(grey, some, start[ids], ids, board)
         known = np.flatnonzero(good)
         start = np.where(good[:, None], fine.pixels, np.nan)
         more, there = next_corners(places, known, fine.pixels[known], board.reach)
@@ -136,19 +139,22 @@ def _once_more(
     start = fine.pixels[ids]
     again = refined(grey, start, board.places[ids], approach=False, arm=board.arm)
     good = good.copy()
-    good[ids] = _fit(again, start, ids, board)
+    good[ids] = _fit(grey, again, start, ids, board)
     return fine.with_others(ids, again), good
 
 
 def _fit(
-    fine: Refined, start: Float[ndarray, "k 2"], ids: Int[ndarray, " k"], board: CornersOfBoard
+    grey: ndarray, fine: Refined, start: Float[ndarray, "k 2"], ids: Int[ndarray, " k"], board: CornersOfBoard
 ) -> Bool[ndarray, " k"]:
     """Which corners are saddles of the board's lattice where they were foreseen."""
     places = board.places[ids]
     step = np.maximum(nearest_neighbour(start, places), LEAST_STEP_PX)
     fits = fine.believed & (grid_shape(fine.pixels, places).stray < MOST_STRAY_SHARE)
     fits &= np.hypot(*(fine.pixels - start).T) < FARTHEST_SHARE * step
-    return fits & _alternate(fine.contrast, fits, board.cells[ids])
+    fits &= _alternate(fine.contrast, fits, board.cells[ids])
+    if board.tags is not None:
+        fits[fits] = are_at_tags(grey, fine.pixels[fits], places[fits], ids[fits], board.tags)
+    return fits
 
 
 def sight_of(grown: Grown, board: CornersOfBoard, shape: tuple[int, ...], remark: str) -> Sight | None:
