@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benchmarks.studies.false_corners import FALSE_PX, errors_of, photographs
+from benchmarks.studies.false_corners import FALSE_PX, OTHER_BOARDS, errors_of, photographs
 
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
@@ -47,7 +47,7 @@ def test_a_disc_whose_fit_failed_is_not_given_out(seed, number):
     sight = see(shown.picture, shown.target)
     assert isinstance(sight, Sight)
     assert np.isfinite(sight.pixels).all()
-    assert len(sight.ids) >= 0.7 * len(shown.truth)
+    assert len(sight.ids) >= 0.6 * len(shown.truth)
     assert errors_of(shown, sight).max() < FALSE_PX
 
 
@@ -57,6 +57,33 @@ def test_lines_that_leap_by_a_knight_s_move_are_parted():
     sight = see(shown.picture, shown.target)
     assert isinstance(sight, Sight)
     assert len(sight.ids) >= 30
+    assert errors_of(shown, sight).max() < 0.5
+
+
+def test_lines_that_kink_are_parted_where_blur_hides_what_is_between_them():
+    """All ids were a column on: squares as wide as the blur did not tell that the first was none."""
+    (shown,) = photographs(1, seed=37, first=313)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert errors_of(shown, sight).max() < 0.5
+
+
+def test_a_marker_s_bend_arrives_where_a_fisheye_bends_most():
+    """A bend that was begun anew with each step arrived nowhere, and a corner was 1.1 px off."""
+    (shown,) = photographs(1, seed=17, first=1869)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) >= 73
+    assert errors_of(shown, sight).max() < 0.5
+
+
+@pytest.mark.parametrize(("number", "least"), [(1160, 13), (7088, 50)], ids=["beside a cover", "small"])
+def test_a_tag_s_corner_is_not_taken_for_the_one_across_the_gap(number, least):
+    """Gaps of 4 px: up to three corners next to each other were the next tags'."""
+    (shown,) = photographs(1, seed=1, first=number, boards=OTHER_BOARDS)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) >= least
     assert errors_of(shown, sight).max() < 0.5
 
 
