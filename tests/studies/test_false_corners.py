@@ -68,6 +68,15 @@ def test_lines_that_kink_are_parted_where_blur_hides_what_is_between_them():
     assert errors_of(shown, sight).max() < 0.5
 
 
+def test_lines_too_many_do_not_make_a_wrong_way_the_only_one_on_the_board():
+    """A lattice that went on for two lines beyond a ChArUco board lay on it only a column on."""
+    (shown,) = photographs(1, seed=43, first=954)
+    sight = see(shown.picture, shown.target)
+    assert isinstance(sight, Sight)
+    assert len(sight.ids) >= 50
+    assert errors_of(shown, sight).max() < FALSE_PX
+
+
 def test_a_marker_s_bend_arrives_where_a_fisheye_bends_most():
     """A bend that was begun anew with each step arrived nowhere, and a corner was 1.1 px off."""
     (shown,) = photographs(1, seed=17, first=1869)

@@ -172,11 +172,15 @@ def likeliest_way(
     sums, counts, over = (
         np.concatenate([part.ravel() for part in parts]) for parts in zip(*shifts, strict=True)
     )
+    likely = _likelihoods(np.where(counts > 0, sums, 0.0), np.where(counts > 0, counts, 1))
     for most_over in (0, MOST_OVERHANG):
         may_lie = (over <= most_over) & (counts > 0)
         best = _likeliest(
             np.where(may_lie, sums, 0.0), np.where(may_lie, counts, 1), layout_of, bool(most_over)
         )
+        # lines too many make a wrong way the only one that is not over the rim
+        if best is not None and likely.max() >= likely[best] + LEAST_LIKELIER:
+            continue
         if best is not None:
             of_marker, may, numbers, turns, layout = asked[of[best]]
             shift = np.unravel_index(best - int(np.argmax(of == of[best])), shifts[of[best]].sums.shape)
@@ -194,9 +198,7 @@ def _likeliest(
     Where the board is seen so that two layouts have the same markers in the same squares they are as likely;
     then it is the first, which was said. A lattice that reaches over the board is doubtful, and says nothing.
     """
-    z = sums / np.sqrt(counts)
-    usual = z.max() / np.sqrt(counts[z.argmax()])
-    likely = usual * sums - 0.5 * counts * usual**2
+    z, likely = sums / np.sqrt(counts), _likelihoods(sums, counts)
     best = [np.where(layouts == layout, likely, -np.inf).argmax() for layout in np.unique(layouts)]
     chosen = best[0]
     for other in best[1:]:
@@ -206,6 +208,15 @@ def _likeliest(
     compared[chosen] = 0.0
     sure = z[chosen] >= LEAST_Z and likely[chosen] - max(float(compared.max()), 0.0) >= LEAST_LIKELIER
     return int(chosen) if sure else None
+
+
+def _likelihoods(sums: Float[ndarray, " w"], counts: Int[ndarray, " w"]) -> Float[ndarray, " w"]:
+    """Logarithms of how much likelier than chance each way makes what is seen, if all have markers that are
+    seen as well as those of the one that chance makes least.
+    """
+    z = sums / np.sqrt(counts)
+    usual = z.max() / np.sqrt(counts[z.argmax()])
+    return usual * sums - 0.5 * counts * usual**2
 
 
 def _told(squares: Squares, turns: int, markers: Drawings) -> Float[ndarray, "r c k"]:
