@@ -18,7 +18,16 @@ import numpy as np
 
 from orthoscope.geometry.arrays import Float, ndarray
 
-__all__ = ["GridShape", "cross", "grid_shape", "lattice", "nearest_neighbour", "one_line_more", "steps_of"]
+__all__ = [
+    "GridShape",
+    "cross",
+    "filled",
+    "grid_shape",
+    "lattice",
+    "nearest_neighbour",
+    "one_line_more",
+    "steps_of",
+]
 
 # Through so many corners of a line the polynomial of this degree goes exactly.
 EXACT_FIT = (4, 3)
@@ -103,6 +112,45 @@ def nearest_neighbour(corners: Float[ndarray, "m 2"], places: Float[ndarray, "m 
 def one_line_more(grid: Float[ndarray, "rows columns 2"]) -> Float[ndarray, "more columns 2"]:
     """The grid with one row more after its last, by the parabola through the last three of each column."""
     return np.concatenate([grid, 3.0 * grid[-1:] - 3.0 * grid[-2:-1] + grid[-3:-2]])
+
+
+def filled(grid: Float[ndarray, "r c 2"], *, rounds: int = 1000) -> Float[ndarray, "r c 2"]:
+    """The grid with its gaps filled: each from those of its neighbours whose lines foresee it, near ones
+    first.
+    """
+    grid = grid.copy()
+    for _ in range(rounds):
+        if not np.isnan(grid[..., 0]).any():
+            break
+        told = _foreseen(grid)
+        known = np.isfinite(told[..., 0])
+        count = known.sum(0)
+        new = np.isnan(grid[..., 0]) & (count > 0)
+        if not new.any():
+            return np.where(np.isnan(grid), -1e4, grid)  # far outside: nothing foresees it
+        total = np.where(known[..., None], told, 0.0).sum(0)
+        grid[new] = (total / np.maximum(count, 1)[..., None])[new]
+    return grid
+
+
+def _foreseen(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "12 r c 2"]:
+    """Each place from the two before it on its line, the two beside it, and three of a parallelogram, from
+    all four sides.
+    """
+    rows, columns = grid.shape[:2]
+    around = np.full((rows + 4, columns + 4, 2), np.nan)
+    around[2:-2, 2:-2] = grid
+
+    def at(down: int, along: int) -> ndarray:
+        return around[2 + down : 2 + down + rows, 2 + along : 2 + along + columns]
+
+    told = np.empty((12, *grid.shape))
+    for i, (down, along) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+        beside = (along, -down)
+        told[i] = 2.0 * at(down, along) - at(2 * down, 2 * along)
+        told[4 + i] = at(down, along) + at(*beside) - at(down + beside[0], along + beside[1])
+        told[8 + i] = 0.5 * (at(down, along) + at(-down, -along))
+    return told
 
 
 def cross(first: Float[ndarray, "*batch 2"], second: Float[ndarray, "*batch 2"]) -> Float[ndarray, "*batch"]:

@@ -18,40 +18,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.chessboards.grid import grid_shape, one_line_more
+from orthoscope.detection.chessboards.clear_lattices import rim_box, without_strays
+from orthoscope.detection.chessboards.grid import filled, one_line_more
 from orthoscope.detection.chessboards.lattices import CornerLattice
 from orthoscope.detection.chessboards.squares import alternating, plain_part
 from orthoscope.geometry.arrays import Bool, Float, Int, median, ndarray
 
 __all__ = [
     "Grid",
-    "filled",
     "grid_of",
     "is_even",
     "laid_out",
-    "on_lines",
     "placements",
     "without_lost_lines",
-    "without_strays",
-    "without_thin_lines",
 ]
 
-# A corner strays from the parabolas of its row and column by at most this share of a step.
-FARTHEST_STRAY_SHARE = 0.3
-# Strays are taken out at most so many times, those nearly as far off as the worst together.
-CLEARING_ROUNDS = 12
-# Beyond this share of the worst stray a corner is nearly as far off.
-NEARLY_WORST_SHARE = 0.8
-# At least this share of the corners is left when strays are taken out; with fewer it was a lattice by chance.
-LEAST_LEFT_SHARE = 0.5
 # A corner has more than this share of the usual strength of one.
 LEAST_CONTRAST_SHARE = 0.3
 # A line goes on where at least this share of its corners that are in the picture stands out.
 GOING_ON_SHARE = 0.6
 # The board ends where this share of a line's squares alternates, with white behind them.
 BLANK_SQUARES_SHARE = 0.75
-# A line at the rim with fewer than three corners, and less than this share of the next line's, is chance.
-THIN_LINE_SHARE = 0.34
 # So many lines more are needed for the shape of those.
 SHAPING_LINES = 2
 # The usual difference of corners' strengths from their median is less than this share of it on a board.
@@ -118,7 +105,7 @@ def _boxed(
     corners: Float[ndarray, "r c 2"], bright: bool
 ) -> tuple[Float[ndarray, "rows columns 2"], bool] | None:
     """The rows and columns with corners, and whether their first square is the bright one; None without."""
-    box = _box(np.isfinite(corners[..., 0]))
+    box = rim_box(np.isfinite(corners[..., 0]))
     return (corners[box], bright ^ bool((box[0].start + box[1].start) % 2)) if box else None
 
 
@@ -176,7 +163,7 @@ def without_lost_lines(
         seen: which of them are left.
         most: lines that are added at most.
     """
-    box = _box(seen)
+    box = rim_box(seen)
     if box is None or seen[box].shape == seen.shape:
         return None
     known = np.where(seen[..., None], corners, np.nan)[box]
@@ -184,113 +171,11 @@ def without_lost_lines(
     return _taken_further(grey, filled(known), seen[box], bright, most)
 
 
-def filled(grid: Float[ndarray, "r c 2"], *, rounds: int = 1000) -> Float[ndarray, "r c 2"]:
-    """The grid with its gaps filled: each from those of its neighbours whose lines foresee it, near ones
-    first.
-    """
-    grid = grid.copy()
-    for _ in range(rounds):
-        if not np.isnan(grid[..., 0]).any():
-            break
-        told = _foreseen(grid)
-        known = np.isfinite(told[..., 0])
-        count = known.sum(0)
-        new = np.isnan(grid[..., 0]) & (count > 0)
-        if not new.any():
-            return np.where(np.isnan(grid), -1e4, grid)  # far outside: nothing foresees it
-        total = np.where(known[..., None], told, 0.0).sum(0)
-        grid[new] = (total / np.maximum(count, 1)[..., None])[new]
-    return grid
-
-
-def _foreseen(grid: Float[ndarray, "r c 2"]) -> Float[ndarray, "12 r c 2"]:
-    """Each place from the two before it on its line, the two beside it, and three of a parallelogram, from
-    all four sides.
-    """
-    rows, columns = grid.shape[:2]
-    around = np.full((rows + 4, columns + 4, 2), np.nan)
-    around[2:-2, 2:-2] = grid
-
-    def at(down: int, along: int) -> ndarray:
-        return around[2 + down : 2 + down + rows, 2 + along : 2 + along + columns]
-
-    told = np.empty((12, *grid.shape))
-    for i, (down, along) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
-        beside = (along, -down)
-        told[i] = 2.0 * at(down, along) - at(2 * down, 2 * along)
-        told[4 + i] = at(down, along) + at(*beside) - at(down + beside[0], along + beside[1])
-        told[8 + i] = 0.5 * (at(down, along) + at(-down, -along))
-    return told
-
-
-def without_strays(found: CornerLattice) -> CornerLattice | None:
-    """The lattice without corners that are off their neighbours' lines; None where hardly any is left."""
-    keep = on_lines(found.pixels, found.cells.astype(float))
-    if keep is None:
-        return None
-    cells = found.cells[keep]
-    return CornerLattice(found.pixels[keep], cells - cells.min(0), found.bright[keep])
-
-
-def without_thin_lines(found: CornerLattice) -> CornerLattice | None:
-    """The lattice without lines at its rim that have hardly a corner, and may be chance; None where nothing
-    is left.
-    """
-    seen = np.zeros(found.size[::-1], dtype=bool)
-    seen[found.cells[:, 1], found.cells[:, 0]] = True
-    box = _box(seen)
-    if box is None:
-        return None
-    low, high = (np.array([getattr(part, end) for part in box[::-1]]) for end in ("start", "stop"))
-    keep = ((found.cells >= low) & (found.cells < high)).all(1)
-    return CornerLattice(found.pixels[keep], found.cells[keep] - low, found.bright[keep])
-
-
-def on_lines(pixels: Float[ndarray, "m 2"], places: Float[ndarray, "m 2"]) -> Bool[ndarray, " m"] | None:
-    """Which corners of a lattice are on their neighbours' lines, the worst taken out first; None where hardly
-    any is.
-
-    Args:
-        pixels: the corners.
-        places: column and row of each in the lattice, in steps.
-    """
-    keep = np.arange(len(pixels))
-    for _ in range(CLEARING_ROUNDS):
-        if len(keep) < max(4, LEAST_LEFT_SHARE * len(pixels)):
-            return None
-        stray = grid_shape(pixels[keep], places[keep]).stray
-        if stray.max() <= FARTHEST_STRAY_SHARE:
-            break
-        keep = keep[stray <= max(FARTHEST_STRAY_SHARE, NEARLY_WORST_SHARE * stray.max())]
-    return np.isin(np.arange(len(pixels)), keep)
-
-
 def _stands(grey: ndarray, grid: ndarray, bright: bool) -> Bool[ndarray, "r c"]:
     """Where the squares around a corner are bright and dark as they must be there, with contrast enough."""
     strength = alternating(grey, grid) * (1.0 if bright else -1.0)
     usual = median(strength[strength > 0]) if (strength > 0).any() else np.inf
     return strength > LEAST_CONTRAST_SHARE * usual
-
-
-def _box(seen: Bool[ndarray, "r c"]) -> tuple[slice, slice] | None:
-    """Rows and columns with corners, thin lines at the rim left out."""
-    top, bottom, left, right = 0, seen.shape[0], 0, seen.shape[1]
-    while bottom - top >= 2 and right - left >= 2:
-        part = seen[top:bottom, left:right]
-        lines = [
-            (part[0], part[1]),
-            (part[-1], part[-2]),
-            (part[:, 0], part[:, 1]),
-            (part[:, -1], part[:, -2]),
-        ]
-        thin = [
-            line.sum() == 0 or (line.sum() < 3 and line.sum() < THIN_LINE_SHARE * next_.sum())
-            for line, next_ in lines
-        ]
-        if not any(thin):
-            return slice(top, bottom), slice(left, right)
-        top, bottom, left, right = top + thin[0], bottom - thin[1], left + thin[2], right - thin[3]
-    return None
 
 
 def _taken_further(grey: ndarray, grid: ndarray, seen: ndarray, bright: bool, most: int) -> Grid:

@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orthoscope.detection.chessboards.grid import grid_shape, nearest_neighbour
-from orthoscope.detection.chessboards.partial_board import filled
+from orthoscope.detection.chessboards.grid import filled, grid_shape, nearest_neighbour
 from orthoscope.detection.saddles.refine import Refined, refined, sought_again
 from orthoscope.detection.saddles.smooth_grid import off_smooth_grid
 from orthoscope.geometry.arrays import Bool, Float, median, ndarray

@@ -10,8 +10,8 @@ from functools import cache, partial
 
 import numpy as np
 
+from orthoscope.detection.chessboards.clear_lattices import on_lines
 from orthoscope.detection.chessboards.lattices import CornerLattice
-from orthoscope.detection.chessboards.partial_board import on_lines
 from orthoscope.detection.markers.board_lattices import corners_by_lattice
 from orthoscope.detection.markers.foreseen import next_corners
 from orthoscope.detection.markers.joint_reading import (

@@ -6,8 +6,9 @@ from functools import cache, partial
 
 import numpy as np
 
+from orthoscope.detection.chessboards.clear_lattices import without_strays, without_thin_lines
+from orthoscope.detection.chessboards.grid import filled
 from orthoscope.detection.chessboards.lattices import CornerLattice
-from orthoscope.detection.chessboards.partial_board import filled, without_strays, without_thin_lines
 from orthoscope.detection.markers.board_lattices import corners_by_lattice
 from orthoscope.detection.markers.joint_reading import Way, drawings_of, likeliest_way, seen_squares
 from orthoscope.geometry.arrays import Float, Int, ndarray

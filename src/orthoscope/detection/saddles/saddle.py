@@ -18,6 +18,10 @@ Gauss-Newton on c, t1, t2 and log w. m, g and C are linear: each step finds them
 so that they need no start. A few corners tell the blur from which all begin. The first steps look at the
 inner half of a window, a quarter of its pixels; to the whole, one or two are left, and a corner that has
 arrived takes no part in the next.
+
+A window may have fewer pixels than a saddle has unknowns, and then leaves nothing, whatever the noise. Once
+the inner halves have told what is usual, contrast, blur and the edges' directions are held to it as far as
+noise hides them, and no window is believed to have less noise than the picture.
 """
 
 from __future__ import annotations
