@@ -64,7 +64,7 @@ def are_at_tags(
     ways = np.array([[ALONG_GAPS, inside], [inside, ALONG_GAPS]])
     there = pixels[:, None] + np.concatenate([ways, -ways]) @ steps  # (k, 4, 2), those of the tag first
     height, width = grey.shape
-    seen = ((there >= 0) & (there <= np.array([width, height]) - 1)).all((1, 2))
+    seen = np.asarray(((there >= 0) & (there <= np.array([width, height]) - 1)).all((1, 2)))
     x, y = np.where(seen[:, None, None], there, 0.0).astype(np.float32).transpose(2, 0, 1)
     values = cv2.remap(grey, x.copy(), y.copy(), cv2.INTER_LINEAR).astype(float)
     brighter = np.where(seen, values[:, 2:].sum(1) - values[:, :2].sum(1), 0.0)
