@@ -74,6 +74,9 @@ ENOUGH_TO_COMPARE, MOST_USUAL_SHARE = 4, 0.004
 LOCAL_MODULES, MOST_LOCALLY_UNEXPLAINED = 1.5, 0.0015
 # Of a good corner the standard deviation is less than this, pixels.
 WIDEST_SPREAD = 0.22
+# Of a marker that leaves more than so many times what is usual, since something covers a part of it or it is
+# bent too much, at most this share of that.
+TOUCHED_TIMES, TOUCHED_SHARE = 4.0, 0.5
 # With a blur of at least this, pixels, it is told how much of what is left hangs together.
 LEAST_COHERENCE_BLUR = 0.7
 
@@ -118,7 +121,8 @@ def fit_markers(
         fine[number] = (fit.corners + 0.5) * shrink - 0.5
         noise_here = max(noise / shrink**2, min(usual, MOST_USUAL_SHARE * signal)) / signal
         good[number] = fit.left_near_corners() < MOST_LOCALLY_UNEXPLAINED + noise_here
-        good[number] &= fit.spread() * np.sqrt(fit.coherence_near_corners()) * shrink < WIDEST_SPREAD
+        widest = WIDEST_SPREAD * (TOUCHED_SHARE if fit.noise > TOUCHED_TIMES * noise_here * signal else 1.0)
+        good[number] &= fit.spread() * np.sqrt(fit.coherence_near_corners()) * shrink < widest
         good[number] &= fit.unexplained < MOST_UNEXPLAINED + noise_here / (0.25 + noise_here)
     return FittedMarkers(fine, good)
 
