@@ -68,10 +68,10 @@ def test_lines_that_kink_are_parted_where_blur_hides_what_is_between_them():
     assert errors_of(shown, sight).max() < 0.5
 
 
-@pytest.mark.parametrize("number", [1813, 2985], ids=["chessboard", "marker"])
-def test_a_corner_beside_what_covers_others_is_not_believed_as_they_are(number):
+@pytest.mark.parametrize(("seed", "number"), [(47, 1813), (53, 3673), (47, 2985)])
+def test_a_corner_beside_what_covers_others_is_not_believed_as_they_are(seed, number):
     """Its neighbours, or its marker's other corners, were seen to be covered; it was 1 to 1.6 px off."""
-    (shown,) = photographs(1, seed=47, first=number)
+    (shown,) = photographs(1, seed=seed, first=number)
     sight = see(shown.picture, shown.target)
     assert isinstance(sight, Sight)
     assert len(sight.ids) >= 28

@@ -83,7 +83,8 @@ def are_contradicted(
         if not len(little):
             little = doubtful | _beside_lost(pixels, cells, counts, image_size)
         excess = np.maximum(residual / np.where(little[on], of_doubtful, of_others), by_itself)
-        excess[alone & little[on]] = np.inf
+        if excess.max() <= 1.0:  # what is contradicted goes first: with fewer corners others may foresee less
+            excess = np.where(alone & little[on], np.inf, 0.0)
         if excess.max() <= 1.0:
             break
         off[on[excess.argmax()]] = True
