@@ -45,5 +45,7 @@ def see_grid_board(grey: ndarray, board: GridBoard) -> Sight | Unseen:
     if not good.any():
         return Unseen(f"was not found in it: its {len(numbers)} markers have no sharp sides")
     ids = 4 * numbers[:, None] + np.arange(4)
-    good[good] = ~are_off(fine[good], board.points()[ids[good], :2], grey.shape)
+    covered = np.broadcast_to(~good.all(1, keepdims=True), good.shape)  # in part: another corner is not sure
+    places = board.points()[ids[good], :2]
+    good[good] = ~are_off(fine[good], places, grey.shape, doubtful=covered[good])
     return Sight(ids[good], fine[good], remark_on(markers, mine))

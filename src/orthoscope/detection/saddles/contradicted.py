@@ -31,8 +31,9 @@ MOST_OF_SHAPE = (5.0, 15.0)
 NOISY_SPREADS = 2.0
 # A doubtful corner, and any other, that is off by less than this, pixels, stays.
 LITTLE = (0.25, 0.5)
-# In a noisy picture a doubtful corner is no farther than this, pixels, from where the others alone have it.
-MOST_FROM_OTHERS = 1.0
+# In a noisy picture a doubtful corner, or one beside one that was not seen, is no farther than this, pixels,
+# from where the others alone have it.
+MOST_FROM_OTHERS = 0.75
 # Whose own weight among the others is more than this they do not foresee: a doubtful one goes.
 MOST_WEIGHT = 0.85
 # With fewer corners the others say nothing.
@@ -76,13 +77,13 @@ def are_contradicted(
         times = MOST_OF_NOISE if noisy else MOST_OF_SHAPE
         of_doubtful, of_others = (max(most * usual, least) for most, least in zip(times, LITTLE, strict=True))
         from_others = residual / np.sqrt(1.0 - weight) / MOST_FROM_OTHERS
-        by_itself = np.where(doubtful[on] & noisy, from_others, 0.0)
         alone = weight > MOST_WEIGHT
-        if residual.max() <= of_doubtful and by_itself.max() <= 1.0 and not alone.any():
+        if residual.max() <= of_doubtful and from_others.max() <= 1.0 and not alone.any():
             break
         if not len(little):
             little = doubtful | _beside_lost(pixels, cells, counts, image_size)
-        excess = np.maximum(residual / np.where(little[on], of_doubtful, of_others), by_itself)
+        excess = residual / np.where(little[on], of_doubtful, of_others)
+        excess = np.maximum(excess, np.where(little[on] & noisy, from_others, 0.0))
         if excess.max() <= 1.0:  # what is contradicted goes first: with fewer corners others may foresee less
             excess = np.where(alone & little[on], np.inf, 0.0)
         if excess.max() <= 1.0:
