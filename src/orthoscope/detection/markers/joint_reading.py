@@ -45,6 +45,9 @@ EVENING_SHARE = 0.5
 MOST_OTHERS = 100
 # A lattice may reach over the board by so many squares, which are none of it.
 MOST_OVERHANG = 1
+# No way is believed whose logarithm of likelihood is less than this share of that of the likeliest one, be it
+# over the rim; some markers at the rim may be seen badly, half of all not.
+LEAST_SHARE_OF_LIKELIEST = 0.5
 # Squares so far around one tell whether the way is right there, too.
 LOCAL_REACH = 2
 # They agree with it, in the mean, by at least this share of what all do.
@@ -179,7 +182,7 @@ def likeliest_way(
             np.where(may_lie, sums, 0.0), np.where(may_lie, counts, 1), layout_of, bool(most_over)
         )
         # lines too many make a wrong way the only one that is not over the rim
-        if best is not None and likely.max() >= likely[best] + LEAST_LIKELIER:
+        if best is not None and likely[best] < LEAST_SHARE_OF_LIKELIEST * likely.max():
             continue
         if best is not None:
             of_marker, may, numbers, turns, layout = asked[of[best]]
