@@ -24,8 +24,8 @@ __all__ = ["TagSides", "are_at_tags"]
 ALONG_GAPS, INSIDE_GAPS, INSIDE_TAGS = 1.5, 0.4, 0.12
 # That is at most this share of a tag's side, or nothing is told.
 MOST_ALONG_TAGS = 0.8
-# Where the square's side is darker than the tag's by this share of what others are brighter, it is the tag.
-LEAST_WRONG_SHARE = 0.3
+# The square's side is brighter than the tag's by at least this share of what is usual.
+LEAST_BRIGHTER_SHARE = 0.25
 
 
 class TagSides(NamedTuple):
@@ -69,4 +69,4 @@ def are_at_tags(
     values = cv2.remap(grey, x.copy(), y.copy(), cv2.INTER_LINEAR).astype(float)
     brighter = np.where(seen, values[:, 2:].sum(1) - values[:, :2].sum(1), 0.0)
     usual = median(brighter[seen]) if seen.any() else 0.0
-    return brighter * np.sign(usual) > -LEAST_WRONG_SHARE * abs(usual)
+    return ~seen | (brighter * np.sign(usual) > LEAST_BRIGHTER_SHARE * abs(usual))
