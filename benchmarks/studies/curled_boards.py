@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from benchmarks.studies.false_corners import CAMERAS, FALSE_PX
-from benchmarks.studies.true_places import margin_of
+from benchmarks.studies.true_places import errors_of_sight, margin_of, true_ids
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
 from orthoscope.geometry.arrays import Bool, Float, ndarray
@@ -171,18 +171,16 @@ def main() -> None:
     print("| board | tilts | found | corners of those that face the camera | rms, px | worst, px | false |")
     print("|---|---|---|---|---|---|---|")
     for spec in BOARDS:
-        ways = [np.arange(len(parse_target(spec).points)), *parse_target(spec).symmetries()]
+        target = parse_target(spec)
         for tilts in TILTS:
             boards, found, shown, errors = 0, 0, 0, [np.zeros(0)]
             for one in photographs(spec, tilts, count):
-                sight, truth = see(one.picture, parse_target(spec)), one.truth
+                sight = see(one.picture, target)
                 shown += int(one.whole.sum())
                 if isinstance(sight, Sight):
-                    way = min(
-                        ways, key=lambda w: np.median(np.hypot(*(truth[w[sight.ids]] - sight.pixels).T))
-                    )
-                    boards, found = boards + 1, found + int(one.whole[way[sight.ids]].sum())
-                    errors.append(np.hypot(*(truth[way[sight.ids]] - sight.pixels).T))
+                    ids = true_ids(target, one.truth, sight)
+                    boards, found = boards + 1, found + int(one.whole[ids].sum())
+                    errors.append(errors_of_sight(ids, one.truth, sight))
             off = np.concatenate(errors)
             rms = np.sqrt(0.5 * (off**2).mean()) if len(off) else 0.0
             print(

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from benchmarks.studies.true_places import margin_of, true_places
+from benchmarks.studies.true_places import errors_of_sight, margin_of, true_ids, true_places
 from orthoscope.detection.sight import Sight
 from orthoscope.detection.table import see
 from orthoscope.geometry.arrays import CalibrationError, Float, ndarray
@@ -189,9 +189,7 @@ def errors_of(shown: Shown, sight: Sight) -> Float[ndarray, " n"]:
     """How far each corner is from where its id is, px, in the best of the ways in which the board looks the
     same.
     """
-    ways = [np.arange(len(shown.truth)), *shown.target.symmetries()]
-    off = [np.hypot(*(shown.truth[way[sight.ids]] - sight.pixels).T) for way in ways]
-    return min((np.where(np.isfinite(one), one, np.inf) for one in off), key=np.median)
+    return errors_of_sight(true_ids(shown.target, shown.truth, sight), shown.truth, sight)
 
 
 class Outcome(NamedTuple):

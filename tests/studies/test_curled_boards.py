@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from benchmarks.studies.curled_boards import BOARDS, TILTS, photographs
+from benchmarks.studies.true_places import errors_of_sight, true_ids
 from numpy.testing import assert_allclose
 
 from orthoscope.detection.sight import Sight
@@ -19,6 +19,5 @@ def test_a_curled_board_at_70_degrees_is_found_with_its_ids(spec):
     sight = see(shown.picture, target)
     assert isinstance(sight, Sight)
     assert shown.whole[sight.ids].sum() > 0.85 * shown.whole.sum()
-    ways = [np.arange(len(target.points)), *target.symmetries()]
-    off = min(np.hypot(*(shown.truth[way[sight.ids]] - sight.pixels).T).max() for way in ways)
+    off = errors_of_sight(true_ids(target, shown.truth, sight), shown.truth, sight)
     assert_allclose(off, 0.0, atol=0.5)
