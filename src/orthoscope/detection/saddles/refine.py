@@ -204,17 +204,17 @@ def _refined(
     all_shape = grid_shape(near, places)
     shape, near, step = all_shape.of(some), near[some], step[some]
     arm = asked.arm[some] if isinstance(asked.arm, ndarray) else asked.arm
-    along, down = _window(shape.along), _window(shape.down)
-    bends, arms = np.stack([shape.bend_along, shape.bend_down], axis=1), _arms(shape, arm)
+    bends = np.stack([shape.bend_along, shape.bend_down], axis=1)
+    windows = _Windows(_window(shape.along), _window(shape.down), bends, _arms(shape, arm))
     smooth = cv2.GaussianBlur(small, (0, 0), SMOOTHING_SIGMA)
     noise = usual.noise if usual else NOISE_LEFT_SHARE * _noise_of(grey, small, shrink)
     saddles = fit_saddles(
         smooth,
         near,
-        along,
-        down,
-        bends=bends,
-        arms=arms,
+        windows.along,
+        windows.down,
+        bends=windows.bends,
+        arms=windows.arms,
         noise=noise,
         usual=(usual.blur, usual.contrast) if usual else None,
     )
@@ -234,31 +234,50 @@ def _refined(
         shrink, noise, median(saddles.blur), median(np.abs(saddles.contrast)), median(left)
     )
     left -= usual.left
-    whole = np.ones(len(left), dtype=bool)
     plain = left <= HARDLY_UNEXPLAINED + HARDLY_UNEXPLAINED_NOISE * noise_share
-    doubtful = np.flatnonzero(~plain)
-    if len(doubtful):
-        few = Saddles(*(part[doubtful] for part in saddles))
-        told = saddle_arms(
-            smooth,
-            few,
-            along[doubtful],
-            down[doubtful],
-            bends=bends[doubtful],
-            arms=arms[doubtful],
-            noise=noise,
-        )
-        most_left = np.where(arms < 1.0, MOST_UNEXPLAINED_BY_MARKS, MOST_UNEXPLAINED)
-        little = left < most_left + MOST_UNEXPLAINED_NOISE * noise_share
-        whole[doubtful] = _have_whole_arms(told, little[doubtful])
-        unlike = (arms[doubtful] >= 1.0) & (told.spread < SMALL_ARM_SPREAD).all(1)
-        saddles.places[doubtful[unlike]] = told.places[unlike]
+    whole = _are_whole(smooth, saddles, windows, ~plain, left, noise=noise, noise_share=noise_share)
     pixels = (np.where(believed[:, None], saddles.places, near) + 0.5) * shrink - 0.5 + first
     sure &= (_turn(saddles, shape) < WIDEST_TURN) & (
         np.abs(saddles.contrast) > LEAST_CONTRAST_SHARE * usual.contrast
     )
     spread = saddles.spread * shrink
     return Refined(pixels, believed, saddles.explained, sure, whole, spread, plain, saddles.contrast, usual)
+
+
+class _Windows(NamedTuple):
+    """The windows of n corners: see `fit_saddles`."""
+
+    along: Float[ndarray, "n 2"]
+    down: Float[ndarray, "n 2"]
+    bends: Float[ndarray, "n 2"]
+    arms: Float[ndarray, " n"]
+
+
+def _are_whole(
+    smooth: ndarray,
+    saddles: Saddles,
+    windows: _Windows,
+    doubtful: Bool[ndarray, " n"],
+    left: Float[ndarray, " n"],
+    *,
+    noise: float,
+    noise_share: Float[ndarray, " n"],
+) -> Bool[ndarray, " n"]:
+    """Which saddles nothing covers: of those that are doubtful the arms are asked, and where these agree the
+    saddle's place is set to what they say, too.
+    """
+    whole, some = ~doubtful, np.flatnonzero(doubtful)
+    if not len(some):
+        return whole
+    along, down, bends, arms = (part[some] for part in windows)
+    few = Saddles(*(part[some] for part in saddles))
+    told = saddle_arms(smooth, few, along, down, bends=bends, arms=arms, noise=noise)
+    most_left = np.where(arms < 1.0, MOST_UNEXPLAINED_BY_MARKS, MOST_UNEXPLAINED)
+    little = left[some] < most_left + MOST_UNEXPLAINED_NOISE * noise_share[some]
+    whole[some] = _have_whole_arms(told, little)
+    unlike = (arms >= 1.0) & (told.spread < SMALL_ARM_SPREAD).all(1)
+    saddles.places[some[unlike]] = told.places[unlike]
+    return whole
 
 
 def _noise_of(grey: ndarray, small: ndarray, shrink: int) -> float:
